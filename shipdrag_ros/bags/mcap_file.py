@@ -235,8 +235,9 @@ def unpacked_file(path: Path, damages: DamageList) -> IO[bytes] | None:
     unpacked = NamedTemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
     decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
     try:
-        with disk_errors(path, 'unpacked'), path.open('rb') as packed:
-            limit = max(CHUNK_LIMIT_BYTES, path.stat().st_size * _FILE_RATIO)
+        with disk_errors(path, 'unpacked'), open(path, 'rb', opener=_at_once) as packed:
+            limit = max(CHUNK_LIMIT_BYTES, packed.seek(0, 2) * _FILE_RATIO)
+            packed.seek(0)
             while not decoder.eof:
                 piece = packed.read(_PIECE_BYTES)
                 if not piece:

@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,6 +35,7 @@ from shipdrag_ros.messages import (
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
 from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.ship import SHIP_FILE, Ship
 
 WindowSpan = tuple[float, float]
 
@@ -215,6 +217,19 @@ class Run:
             return (first.parent,)
         bag = first.parent if first.parent.name.strip('.') else first.parent.resolve()
         return bag, bag.parent
+
+    @cached_property
+    def ship(self) -> Ship | None:
+        """The ship whose file is attached, or else lies beside it, which is noted."""
+        text = self.attachments.get(SHIP_FILE)
+        if text is not None:
+            return Ship.from_yaml(text, subject=f'{self.name}: {SHIP_FILE}')
+        near = (each / SHIP_FILE for each in self.folders)
+        path = next((each for each in near if each.is_file()), None)
+        if path is None:
+            return None
+        self.note([f'{path} holds for this run'])
+        return Ship.load(path)
 
     @property
     def span_ns(self) -> tuple[int, int] | None:

@@ -79,8 +79,7 @@ def _document_info(run: Run) -> dict[str, Any]:
 
 def _show_info(output: Output, run: Run, about: dict[str, Any]) -> None:
     output.heading(run.name)
-    for warning in run.warnings:
-        output.say(f'Warning: {warning}')
+    output.say(*run.warnings, lead='Warning: ')
     span_ns = run.span_ns
     attached = ', '.join(f'{name} ({size} bytes)' for name, size in about['attachments'].items())
     rows = [
@@ -158,16 +157,12 @@ def _document_check(about: FileCheck) -> dict[str, Any]:
         'size_bytes': about.size_bytes,
         'messages': about.messages,
         'damage_count': about.damage_count,
-        'damage': [
-            {
-                'offset': each.offset,
-                'record': each.record,
-                'kind': each.kind.value,
-                'detail': each.detail,
-            }
-            for each in about.damage
-        ],
+        'damage': [_document_damage(each) | {'detail': each.detail} for each in about.damage],
     }
+
+
+def _document_damage(each: Damage) -> dict[str, Any]:
+    return {'offset': each.offset, 'record': each.record, 'kind': each.kind.value}
 
 
 def _damage_table(output: Output, damages: Sequence[Damage], count: int) -> None:
@@ -260,16 +255,11 @@ def _show_recover(output: Output, source: Path, result: Recovery, *, whole: bool
 
 
 def _document_recover(result: Recovery) -> dict[str, Any]:
-    return {
-        'messages_recovered': result.messages_recovered,
-        'messages_crc_suspect': result.messages_crc_suspect,
-        'bytes_read': result.bytes_read,
-        'bytes_lost': result.bytes_lost,
-        'damage': [
-            {'offset': each.offset, 'record': each.record, 'kind': each.kind.value}
-            | ({'file': each.file} if each.file else {})
-            for each in result.damage
-        ],
-        'output': str(result.output),
-        'quarantine': None if result.quarantine is None else str(result.quarantine),
-    }
+    about = asdict(result)
+    del about['damage_count']
+    about['damage'] = [
+        _document_damage(each) | ({'file': each.file} if each.file else {})
+        for each in result.damage
+    ]
+    places = {name: about[name] and str(about[name]) for name in ('output', 'quarantine')}
+    return about | places

@@ -245,8 +245,7 @@ def run(options: argparse.Namespace) -> int:
     write_results(out, results)
     output.heading('Where everything is')
     files_made = [ship_file, *bags, *(out / name for name in (REPORT, JSON, CURVES)), node.log]
-    for path in files_made:
-        output.say(str(path))
+    output.say(*map(str, files_made))
     return _verdict(results)
 
 

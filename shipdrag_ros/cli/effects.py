@@ -15,7 +15,7 @@ from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError, EffectFileError, FleetError
 from shipdrag_ros.imports import need
-from shipdrag_ros.ship import Fact, LearntTerm, Ship, parse_fact
+from shipdrag_ros.ship import SHIP_FILE, Fact, LearntTerm, Ship, parse_fact
 from shipdrag_ros.ship.expression import unit_text
 from shipdrag_ros.ship.facts import RATE as RATE
 from shipdrag_ros.ship.facts import usage
@@ -128,30 +128,24 @@ def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
 def _show_diagnosis(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     from shipdrag_ros.diagnosis import words
 
-    for line in found.summary(ship):
-        output.say(line)
+    output.say(*found.summary(ship))
     if found.question:
         return
-    output.heading('How probable')
-    output.table(words.probabilities_table(found))
+    output.table(words.probabilities_table(found), 'How probable')
     sizes = words.sizes_table(found)
     if sizes.rows:
         were = '' if found.effects else ', were it the one'
-        output.heading(f'How large{were}; sd is one standard deviation')
-        output.table(sizes)
+        output.table(sizes, f'How large{were}; sd is one standard deviation')
     if found.limits:
         output.heading('Effects that are not named: how large they can be; sizes in SI')
         output.table(words.limits_table(found))
     if found.facts:
-        output.heading('Facts that were given')
-        output.table(words.facts_table(found))
-    output.heading('Gap between model and data')
-    output.table(words.gaps_table(found))
+        output.table(words.facts_table(found), 'Facts that were given')
+    output.table(words.gaps_table(found), 'Gap between model and data')
     advice = words.advice(found)
     if advice:
         output.heading('What would decide')
-    for line in advice:
-        output.say(f'  {line}')
+    output.say(*advice, lead='  ')
 
 
 def add_baseline(parser: argparse.ArgumentParser) -> None:
@@ -248,7 +242,6 @@ def _show_baseline(output: Output, found: LearntBaseline) -> None:
         f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '
         f'{low:.2f} to {high:.2f} m/s.'
     )
-    output.heading('Learnt baseline over the one before')
     stated = found.stated_sd
     rows = []
     for i, name in enumerate(found.names):
@@ -257,7 +250,7 @@ def _show_baseline(output: Output, found: LearntBaseline) -> None:
         after = f'{found.relative_sd[i]:.1%}'
         rows.append((name, f'{found.factors[i]:.3f}', f'{sd:.3f}', before, after))
     columns = ('', 'factor', 'sd', 'relative_sd before', 'after')
-    output.table(Table(columns, tuple(rows)))
+    output.table(Table(columns, tuple(rows)), 'Learnt baseline over the one before')
     if len(found.runs) >= ENOUGH:
         output.say(
             f'Runs scatter by {found.shared.scatter:.1%} of their resistance '
@@ -275,8 +268,7 @@ def _show_baseline(output: Output, found: LearntBaseline) -> None:
             for one in found.runs
         )
         output.table(Table(('', 'resistance', 'sd', 'chi2 a sample'), beside))
-    for warning in found.warnings:
-        output.say(f'WARNING: {warning}')
+    output.say(*found.warnings, lead='WARNING: ')
 
 
 def add_learn(parser: argparse.ArgumentParser) -> None:
@@ -320,7 +312,6 @@ def run_learn(options: argparse.Namespace) -> int:
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
     from shipdrag_ros.library.diagnosis import learn_from
-    from shipdrag_ros.replay.playback import attached_ship
 
     output = Output(options.json)
     name = options.name or options.out.stem
@@ -328,15 +319,13 @@ def run_learn(options: argparse.Namespace) -> int:
     given = None if options.ship is None else Ship.load(options.ship)
     bags, kept = _bags(options.bags)
     runs = open_windowed(bags, remap=options.remap, output=output)
-    if given is None and kept and not any(attached_ship(run) for run, _ in runs):
+    if given is None and kept and not any(run.ship for run, _ in runs):
         given = _one(kept)
     with stages(output) as progress:
         found = learn_from(output, runs, given, name, progress)
     output.say(words.sentence(found))
-    for line in words.lines(found):
-        output.say(line)
-    output.heading('How probable')
-    output.table(words.table(found))
+    output.say(*words.lines(found))
+    output.table(words.table(found), 'How probable')
     if found.term is not None:
         options.out.write_text(found.term.to_yaml(), encoding='utf-8')
         output.log(f'effect in {options.out}')
@@ -358,7 +347,6 @@ def _bags(given: Sequence[WindowedBag]) -> tuple[list[WindowedBag], dict[str, st
             found.append(each)
             continue
         need('pyarrow')
-        from shipdrag_ros.fleet.find import SHIP_FILE
         from shipdrag_ros.fleet.store import read_bags, ship_texts
 
         rows = [row for row in read_bags(each.path).to_pylist() if row['coastdowns']]

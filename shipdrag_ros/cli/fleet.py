@@ -5,21 +5,18 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from shipdrag_ros.cli.arguments import add, new_file, whole
-from shipdrag_ros.cli.output import Output, ProgressLines
+from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
-from shipdrag_ros.progress import Progress
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import SHIP_FILE, Ship
 
 if TYPE_CHECKING:
     from shipdrag_ros.fleet.update import Report
@@ -89,7 +86,7 @@ def run_fleet(options: argparse.Namespace) -> int:
         Engine(
             workers=options.workers, scheduler=options.scheduler, at_most=len(found.sources)
         ) as engine,
-        _progress(output) as progress,
+        stages(output, every_s=_EVERY_S, at_once=False) as progress,
     ):
         report = update(found, store, engine, progress)
     _show_fleet(output, options.out, report)
@@ -119,12 +116,10 @@ def _show_fleet(output: Output, store: Path, report: Report) -> None:
             f'{twin.bag!r} has the content of {twin.same_as!r}{other * twin.differs} and is '
             'counted once'
         )
-    for note in report.notes:
-        output.say(note)
+    output.say(*report.notes)
     if report.skipped:
         output.heading(f'{len(report.skipped)} skipped')
-    for each in report.skipped[:_SHOWN]:
-        output.say(f'  {each.bag!r}: {each.reason}')
+    output.say(*(f'  {each.bag!r}: {each.reason}' for each in report.skipped[:_SHOWN]))
     if len(report.skipped) > _SHOWN:
         output.say(f'  and {len(report.skipped) - _SHOWN} more, which --json and bags/ list')
 
@@ -154,16 +149,6 @@ def _document(store: Path, report: Report) -> dict[str, object]:
         'skipped': [{'bag': each.bag, 'reason': each.reason} for each in report.skipped],
         'notes': list(report.notes),
     }
-
-
-@contextmanager
-def _progress(output: Output) -> Iterator[Progress]:
-    """Show a bar to a terminal; to a file a line now and then, with the time left."""
-    if sys.stderr.isatty():
-        with output.progress('') as bar:
-            yield lambda text, done, total: bar(done, total)
-        return
-    yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).show
 
 
 _LISTED = 4
@@ -272,13 +257,11 @@ def _show_trends(
     if not trends:
         output.say('The store holds no coastdown: no trend.')
     else:
-        output.heading('Which hull first')
-        output.table(words.ranking(trends))
+        output.table(words.ranking(trends), 'Which hull first')
         output.say(words.ranked_by(trends))
     for trend in trends:
         output.heading(trend.series.name)
-        for line in words.lines(trend):
-            output.say(line)
+        output.say(*words.lines(trend))
         if trend.events:
             output.table(words.event_table(trend))
     if skipped:
@@ -341,9 +324,6 @@ def _plain(value: object) -> object:
     if isinstance(value, list):
         return [_plain(each) for each in value]
     return value if value is None or isinstance(value, str | int | float) else str(value)
-
-
-SHIP_FILE = 'ship.yaml'
 
 
 def add_poster(parser: argparse.ArgumentParser) -> None:

@@ -32,6 +32,7 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.replay import replayed
 from shipdrag_ros.display import clock
 from shipdrag_ros.forecast.followed import Passed
+from shipdrag_ros.forecast.result import NO_WAY
 from shipdrag_ros.library import forecasts
 
 AFTER = ' '.join(f'{each:g}' for each in forecasts.AFTER_S)
@@ -66,13 +67,13 @@ def run(options: argparse.Namespace) -> int:
     # a window says when `now` is, not that she glides in it
     results = replayed(options, output, parts=options.if_stopped_now)
     for result in results:
-        for warning in result.run.warnings:
-            output.log(f'{result.bag}: {warning}')
+        output.log(*(f'{result.bag}: {warning}' for warning in result.run.warnings))
     if options.if_stopped_now:
         stopped = forecasts.if_stopped_now(results)
         output.heading(stopped.bag)
         output.say(stopped.summary())
-        output.table(stopped.table())
+        if stopped.passed:
+            output.table(stopped.table())
         output.json(document_of_stop(stopped))
         return 0
     found = forecasts.forecast(results, options.after)
@@ -86,12 +87,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _show(output: Output, each: forecasts.GlideForecast) -> None:
-    one = forecasts.Forecasts((each,))
     output.heading(f'{each.bag}, {clock(each.after_s)} after the stop')
-    for line in one.summary().splitlines():
-        output.say(line)
+    output.say(forecasts.Forecasts((each,)).summary())
     if each.checked is not None:
-        output.table(forecasts.milestone_table(each.checked.milestones, each.ship.mass_kg))
+        output.table(each.table())
 
 
 def document(found: forecasts.Forecasts) -> dict[str, Any]:
@@ -135,6 +134,7 @@ def document_of_stop(found: forecasts.IfStopped) -> dict[str, Any]:
             'gliding': found.gliding,
             'over_ground': found.forecast.over_ground,
             'speeds': [_milestone(each) for each in found.passed],
+            'why': None if found.passed else NO_WAY,
         }
     }
 

@@ -120,16 +120,12 @@ def run(options: argparse.Namespace) -> int:
     documents = []
     for source, each, result in zip(options.sources, chosen, results, strict=True):
         output.log(f'{source}: {each.kind}')
-        for understood in result.understood:
-            output.log(f'  {understood}')
-        for line in result.summary(options.out):
-            output.say(line)
+        output.log(*(f'  {understood}' for understood in result.understood))
+        output.say(*result.summary(options.out))
         output.table(result.table())
-        for line in result.details():
-            output.say(line)
+        output.say(*result.details())
         documents.append({'source': str(source), 'format': each.name, **asdict(result)})
-    for line in notes:
-        output.say(line)
+    output.say(*notes)
     whole = documents[0] if len(documents) == 1 else {'files': documents, 'notes': notes}
     output.json({'bag': str(options.out), **whole})
     return 0

@@ -82,8 +82,7 @@ def run_node(options: argparse.Namespace) -> int:
     """
     checked(Ship.load(options.ship))  # here its problems are said before ROS starts
     output = Output()
-    for line in overruled(options.ros_args, ship=options.ship, out=options.out):
-        output.log(line)
+    output.log(*overruled(options.ros_args, ship=options.ship, out=options.out))
     from shipdrag_ros.node import main  # help must not need ROS
 
     output.log(discovery(os.environ, network=options.network))
@@ -256,8 +255,7 @@ def run_watch(options: argparse.Namespace) -> int:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
         source, mark = stack.enter_context(_source(options, ship, past, output, notes))
         fleet = None if options.store is None else fleet_pages(output, options.store)
-        for note in notes:
-            output.log(note)
+        output.log(*notes)
         name, port = page_socket.getsockname()[:2]
         shown = f'[{name}]' if ':' in name else name
 

@@ -31,7 +31,9 @@ _COMPILES = 'compiling, once after an installation or an update; this takes abou
 
 
 @contextmanager
-def stages(output: Output) -> Iterator[Progress]:
+def stages(
+    output: Output, *, every_s: float = _EVERY_S, at_once: bool = True
+) -> Iterator[Progress]:
     """
     Show one stage after the other, and compiling where that is really done.
 
@@ -39,6 +41,8 @@ def stages(output: Output) -> Iterator[Progress]:
     ----------
     output
         Whose log it goes to.
+    every_s, at_once
+        Of `ProgressLines`, where no terminal shows it.
 
     Yields
     ------
@@ -46,7 +50,7 @@ def stages(output: Output) -> Iterator[Progress]:
         Called with each stage, how much of it is done, and of how much.
     """
     with output.bar() as bar, compiling_said(output.log):
-        yield bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).show
+        yield bar or ProgressLines(output.log, every_s=every_s, at_once=at_once).show
 
 
 @contextmanager
@@ -133,11 +137,12 @@ class Output:
         self._result = _console(sys.stderr if json_to == STDOUT else sys.stdout)
         self._log = _console(sys.stderr)
 
-    def say(self, text: str) -> None:
+    def say(self, *texts: str, lead: str = '') -> None:
         """
-        Print a line of the result.
+        Print lines of the result, each behind a lead.
         """
-        self._result.print(text, soft_wrap=True)
+        for text in texts:
+            self._result.print(f'{lead}{text}', soft_wrap=True)
 
     def heading(self, text: str) -> None:
         """
@@ -145,10 +150,12 @@ class Output:
         """
         self._result.print(f'\n{text}', style='bold', soft_wrap=True)
 
-    def table(self, table: Table) -> None:
+    def table(self, table: Table, heading: str | None = None) -> None:
         """
-        Print a table of the result; words to the left, figures to the right.
+        Print a table of the result, under a heading; words to the left, figures to the right.
         """
+        if heading is not None:
+            self.heading(heading)
         heads = any(table.columns)
         shown = RichTable(box=None, show_header=heads, header_style='bold', pad_edge=False)
         for number, name in enumerate(table.columns):
@@ -160,11 +167,12 @@ class Output:
             shown.add_row(*row)
         self._result.print(shown)
 
-    def log(self, text: str) -> None:
+    def log(self, *texts: str) -> None:
         """
-        Print a line that is not part of the result.
+        Print lines that are not part of the result.
         """
-        self._log.print(text, soft_wrap=True, style='dim')
+        for text in texts:
+            self._log.print(text, soft_wrap=True, style='dim')
 
     @contextmanager
     def progress(self, text: str) -> Iterator[PartDone]:
@@ -286,13 +294,10 @@ def show(output: Output, shown: Presentation, report: Path | None) -> None:
     """
     output.say(shown.sentence)
     for part in shown.sections:
-        for text in part.text:
-            output.say(text)
+        output.say(*part.text)
         for caption, table in part.tables:
-            output.heading(caption)
-            output.table(table)
-        for line in part.lines:
-            output.say(f'- {line}')
+            output.table(table, caption)
+        output.say(*part.lines, lead='- ')
     if report is None:
         return
     from shipdrag_ros.report.document import write_page  # takes long to import

@@ -75,8 +75,7 @@ def run(options: argparse.Namespace) -> int:
     if ranking is not None:
         output.heading('Hulls compared: the higher Fr_max, the later a hull makes wave')
         output.table(tables.ranking_table(ranking))
-        for note in ranking.notes:
-            output.say(f'- {note}')
+        output.say(*ranking.notes, lead='- ')
     else:
         show_together(output, together(results), results)
     if options.report is not None:
@@ -148,29 +147,23 @@ def show_run(output: Output, run: RunResult) -> None:
     """
     output.heading(run.bag)
     output.say(run.ship.summary())
-    for warning in run.warnings:
-        output.say(f'Warning: {warning}')
+    output.say(*run.warnings, lead='Warning: ')
     if not run.coastdowns:
-        for line in run.summary():
-            output.say(line)
+        output.say(*run.summary())
     for place, coastdown in enumerate(run.coastdowns, start=1):
         output.heading(f'Coastdown {place}')
         _show_coastdown(output, coastdown, run)
     if run.dismissed:
-        output.heading('What is no coastdown')
-        output.table(tables.not_coastdowns_table(run.dismissed))
-    output.heading('Messages')
-    output.table(tables.inputs_table(run.inputs))
+        output.table(tables.not_coastdowns_table(run.dismissed), 'What is no coastdown')
+    output.table(tables.inputs_table(run.inputs), 'Messages')
     output.say(words.recorded_sentence(run.recorded))
 
 
 def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -> None:
     """Print one coastdown: knots and kN first, m/s and m/s² below."""
-    for line in words.cut_lines(coastdown, run.run.span_ns):
-        output.say(line)
+    output.say(*words.cut_lines(coastdown, run.run.span_ns))
     lines = words.summary(coastdown, run.ship)
-    for line in lines[:-1]:
-        output.say(line)
+    output.say(*lines[:-1])
     estimate = coastdown.estimate
     curve = None if estimate is None else estimate.valid_curve
     if curve is not None and len(curve):
@@ -183,8 +176,7 @@ def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -
         output.say('')
     output.table(tables.facts(coastdown))
     if estimate is not None:
-        for note in estimate_words.notes(estimate):
-            output.say(f'- {note}')
+        output.say(*estimate_words.notes(estimate), lead='- ')
 
 
 def show_together(output: Output, found: Together, runs: Sequence[RunResult]) -> None:
@@ -192,8 +184,7 @@ def show_together(output: Output, found: Together, runs: Sequence[RunResult]) ->
     Print all coastdowns, a line each, and their one r(v), or why there is none.
     """
     if sum(len(run.coastdowns) for run in runs) > 1:
-        output.heading('All coastdowns')
-        output.table(tables.coastdowns_table(runs))
+        output.table(tables.coastdowns_table(runs), 'All coastdowns')
     if found.combined is None:
         if found.why_not:
             output.say(f'Not combined: {found.why_not}.')
@@ -205,5 +196,4 @@ def show_together(output: Output, found: Together, runs: Sequence[RunResult]) ->
     output.table(estimate_words.force_table(found.combined, ship))
     output.say('')
     output.table(estimate_words.combined_table(found.combined))
-    for note in words.combined_notes(found.combined):
-        output.say(f'- {note}')
+    output.say(*words.combined_notes(found.combined), lead='- ')

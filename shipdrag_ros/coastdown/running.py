@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from inspect import unwrap
 
 from shipdrag_ros.coastdown.events import (
     Dismissal,
@@ -19,6 +20,8 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.coastdown.heading import rep103_yaw
 from shipdrag_ros.coastdown.memory import ALWAYS
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
+from shipdrag_ros.coastdown.regimes.motion import rest_speed
 from shipdrag_ros.coastdown.regimes.watch import Dated
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
@@ -212,6 +215,13 @@ def _rest_of_the_glide(
 
 
 _ahead = shielded(_rest_of_the_glide, 'forecast', '')
+
+
+def speed_at_rest(ship: Ship) -> float:
+    """
+    Return up to which speed a ship makes no way, as the regimes have it [m/s].
+    """
+    return float(unwrap(rest_speed)(HullPrior.of(ship)))  # one number needs no compiler
 
 
 def too_vague(found: Estimate, parameters: Parameters) -> str:

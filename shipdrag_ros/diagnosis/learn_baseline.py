@@ -31,7 +31,7 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.inference.decision import NONE
-from shipdrag_ros.inference.linear import solve
+from shipdrag_ros.inference.linear import evidences
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.priors import UNSTATED_FORM
@@ -233,10 +233,9 @@ class SharedBaseline:
         fitted = next(fit for fit in comparing.compare().fitted if fit.names == NONE)
         equations = comparing.equations(fitted)
         families = comparing.runs.priors(fitted.hypothesis, fitted.at)
-        logs, _, _ = solve(
-            np.sum(equations, axis=0)[None], families.mean, families.precision, 0, 0
-        )
-        chance = softmax(logs[0] + families.log_chance)
+        total = np.sum(equations, axis=0)[None]
+        logs = evidences(total, families.mean, families.precision)[0]
+        chance = softmax(logs + families.log_chance)
         mean, precision = chance @ families.mean, chance @ families.precision
         own = comparing.runs.own
         shared = np.delete(np.arange(len(fitted.at)), np.concatenate(own))

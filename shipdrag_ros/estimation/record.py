@@ -22,7 +22,15 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.distance import along_track, evaluate, refit
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.rows import CODES, KIND_COUNT, MAD_TO_SD, OUTLIER, POSITION, Rows
+from shipdrag_ros.inference.rows import (
+    CODES,
+    KIND_COUNT,
+    MAD_TO_SD,
+    OUTLIER,
+    POSITION,
+    Rows,
+    block_medians,
+)
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.priors import STATED_POWER
@@ -89,27 +97,6 @@ def weighted_white_sd(value: Float64, weight: Float64) -> float:
     if typical > 0.0:
         size = size[size < 4.0 * typical]
     return float(np.sqrt(np.mean(size * size) / 6.0))
-
-
-@compiled
-def block_medians(value: Float64, edges: Int64) -> Float64:
-    """
-    Return the medians of parts of a record.
-
-    Parameters
-    ----------
-    value : (n,)
-    edges : (b + 1,)
-        Where each part begins, and the end of the last; none is empty.
-
-    Returns
-    -------
-    (b,)
-    """
-    result = np.empty(len(edges) - 1)
-    for i in range(len(result)):
-        result[i] = np.median(value[edges[i] : edges[i + 1]])
-    return result
 
 
 @compiled

@@ -11,7 +11,7 @@ import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.decision import mixture
-from shipdrag_ros.inference.rows import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD, block_medians
 from shipdrag_ros.posterior.priors import RUN_DOWN, STOP, TOLD, TOLD_CHANCE
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
@@ -79,10 +79,11 @@ class Slowing:
         """
         for series in window.each('speed_through_water', 'speed_over_ground'):
             if len(series) >= _BLOCKS:
-                time_s = (series.time_ns - window.start_ns) * 1e-9
-                parts = np.array_split(np.arange(len(series)), _BLOCKS)
-                speed = np.array([np.median(np.abs(series.value[part])) for part in parts])
-                middle = np.array([np.median(time_s[part]) for part in parts])
+                time_s = np.asarray((series.time_ns - window.start_ns) * 1e-9, np.float64)
+                many, more = divmod(len(series), _BLOCKS)
+                edges = many * np.arange(1 + _BLOCKS) + np.minimum(np.arange(1 + _BLOCKS), more)
+                speed = block_medians(np.abs(series.value), edges)
+                middle = block_medians(time_s, edges)
                 first = speed[0] + 0.5 * max(speed[0] - speed[1], 0.0)
                 if not first > 0.0:
                     return None
@@ -383,7 +384,7 @@ def _dated(window: Window) -> tuple[int, float]:
 def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:
     """Yield number, name and fall of each propeller that shows one."""
     before = window.before
-    slowing = Slowing.of(window)
+    slowing = Slowing.of(window) if any(map(len, window.shafts)) else None
     for number in range(len(SHAFTS)):
         of_propeller = []
         for what, all_of in (('shaft', 'shafts'), ('pitch', 'pitches')):

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from shipdrag_ros.bags.mcap_file import METADATA, PART, is_bag_folder
 from shipdrag_ros.errors import FleetError, ShipFileError, reason_of
+from shipdrag_ros.ship import SHIP_FILE
 from shipdrag_ros.sources.beside import (
     BAGS,
     FIRST_BYTES,
@@ -271,7 +272,7 @@ def _irregular(mode: int) -> str:
     return f'is {kind} and no file; it may have no end'
 
 
-SHIP_FILE, EVENTS_FILE = 'ship.yaml', 'events.csv'
+EVENTS_FILE = 'events.csv'
 LIMIT_BYTES = 64 << 30
 """Of a file; a longer one is skipped."""
 

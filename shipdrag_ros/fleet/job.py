@@ -30,12 +30,12 @@ from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.fleet.find import SHIP_FILE, BagToRead
+from shipdrag_ros.fleet.find import BagToRead
 from shipdrag_ros.fleet.store import BagResult, Row, bag_row, coastdown_row
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.words import run_warnings
-from shipdrag_ros.ship import Fact, LearntTerm, RunSheet, Ship
+from shipdrag_ros.ship import SHIP_FILE, Fact, LearntTerm, RunSheet, Ship
 from shipdrag_ros.simulation.effects import carrying
 from shipdrag_ros.sources.beside import RUN_FILE
 from shipdrag_ros.sources.reading import read_any

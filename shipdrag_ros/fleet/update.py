@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
 
 from shipdrag_ros import __version__
 from shipdrag_ros.errors import FleetError, reason_of
-from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
+from shipdrag_ros.fleet.find import EVENTS_FILE, BagToRead, FoundBags, Skipped
 from shipdrag_ros.fleet.job import BagJob, Identity, content_hash, failed, identify, work
 from shipdrag_ros.fleet.store import (
     BagResult,
@@ -39,6 +39,7 @@ from shipdrag_ros.fleet.store import (
     write_events,
 )
 from shipdrag_ros.progress import Progress
+from shipdrag_ros.ship import SHIP_FILE
 from shipdrag_ros.simulation.effects import terms
 
 if TYPE_CHECKING:

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.estimation.result import Estimate
@@ -464,14 +465,14 @@ class HullNow:
 
     @classmethod
     def of_run(
-        cls, speed_m_s: Float64, resistance_m_s2: Float64, sigma_m_s2: Float64, source: str
+        cls, speed_m_s: Float64, resistance_m_s2: Float64, sigma_m_s2: Float64, start_ns: int
     ) -> HullNow:
         """
-        Take the curve of a coastdown that has ended; the next run differs from it.
+        Take the curve of a coastdown that began then; the next run differs from it.
         """
         alike = np.full(len(speed_m_s), ALIKE.mean)
-        level_sd = ANOTHER_RUN.sd
-        return cls(KnownCurve(speed_m_s, resistance_m_s2, sigma_m_s2, alike, level_sd), source)
+        known = KnownCurve(speed_m_s, resistance_m_s2, sigma_m_s2, alike, ANOTHER_RUN.sd)
+        return cls(known, f'the coastdown of {utc(start_ns)}')
 
     @classmethod
     def of_file(cls, ship: Ship) -> HullNow:
@@ -521,12 +522,13 @@ def if_stopped(
     speed_m_s: float,
     now_ns: int,
     *,
+    rest_m_s: float = 0.0,
     speed_sd_m_s: float = 0.0,
     gliding: bool = False,
     speeds_m_s: tuple[float, ...] = SPEEDS_M_S,
 ) -> Forecast:
     """
-    Foretell the glide that would begin now, with the run-down of the shaft.
+    Foretell the glide that would begin now, with the run-down of the shaft; without way, of none.
 
     Parameters
     ----------
@@ -535,20 +537,20 @@ def if_stopped(
         For n_r, the run-down and the law beyond what is known.
     speed_m_s, now_ns
         Present speed through water, and when she has it [ns].
+    rest_m_s
+        Up to which she makes no way.
     speed_sd_m_s
         Of the present speed.
     gliding
         The shaft has run down already.
     speeds_m_s
         Spoken of, beside shares of the present speed.
-
-    Raises
-    ------
-    EstimationError
-        If she lies still.
     """
-    if not speed_m_s > 0.0:
-        raise EstimationError('she makes no way, there is no glide to foretell')
+    if not speed_m_s > rest_m_s:
+        at, still = np.array([speed_m_s]), np.zeros((1, 3))
+        return Forecast(
+            now_ns, speed_m_s, at, still, still, speed_sd_m_s, 0.0, np.zeros(1), (), False
+        )
     run_down = ship.propulsion or Propulsion(RUN_DOWN.mean, RUN_DOWN.mean * RUN_DOWN.sd)
     now = Beginning(
         made_ns=now_ns,

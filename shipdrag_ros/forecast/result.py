@@ -16,6 +16,9 @@ from shipdrag_ros.samples import SECOND_NS, Float64, Int64
 Z = 1.6448536269514722
 """Standard deviations on either side of the median that hold 90 %."""
 
+NO_WAY = 'she makes no way ahead, there is no glide to foretell'
+"""Of a forecast without targets."""
+
 
 class Band(NamedTuple):
     """Median of a time [s] or distance [m], and the bounds that hold 90 %."""

@@ -102,6 +102,27 @@ def bin_means(time_s: Float64, value: Float64, edges: Float64) -> tuple[Float64,
     return np.add.reduceat(time_s[order], first) / count, mean, count
 
 
+@compiled
+def block_medians(value: Float64, edges: Int64) -> Float64:
+    """
+    Return the medians of parts of a record.
+
+    Parameters
+    ----------
+    value : (n,)
+    edges : (b + 1,)
+        Where each part begins, and the end of the last; none is empty.
+
+    Returns
+    -------
+    (b,)
+    """
+    result = np.empty(len(edges) - 1)
+    for i in range(len(result)):
+        result[i] = np.median(value[edges[i] : edges[i + 1]])
+    return result
+
+
 MAD_TO_SD = 1.482602218505602
 """Standard deviation of normal noise over the median of its size."""
 
@@ -177,11 +198,9 @@ _APART = 1e-4  # of decay rates times the step: closer ones are taken as so far 
 
 
 @compiled(inline=True, uncounted=True)
-def _response(a: float, b: float, dt: float) -> tuple[float, float, float]:
-    """Return speed and distance, by the force that decays at b, after a time; and what is left."""
-    left = math.exp(-b * dt)
-    by_a, by_b = -math.expm1(-a * dt), -math.expm1(-b * dt)
-    return (by_a - by_b) / (a - b), (by_b / b - by_a / a) / (a - b), left
+def _response(a: float, b: float, by_a: float, by_b: float) -> tuple[float, float]:
+    """Return speed and distance, by a force that decays at b, by what is gone of 1 at a and b."""
+    return (by_a - by_b) / (a - b), (by_b / b - by_a / a) / (a - b)
 
 
 @compiled
@@ -212,25 +231,27 @@ def _fill_step(
             decay = math.exp(-dt / time_s[k if k < 4 else 2 + k % _OWN])
             step[_DECAYS + 2 * k] = decay
             step[_DECAYS + 2 * k + 1] = size[k] ** 2 * (1.0 - decay * decay)
-    step[_U_BY_U] = math.exp(-damping * dt)
-    step[_X_BY_U] = -math.expm1(-damping * dt) / damping
+    gone = -math.expm1(-damping * dt)
+    step[_U_BY_U], step[_X_BY_U] = 1.0 - gone, gone / damping
     step[_X_BY_WATER] = 0.5 * dt * (1.0 + step[_DECAYS + 2])
     if size[0] > 0.0:
         b = 1.0 / slow.gust_s
         a = damping if abs(damping - b) * dt > _APART else b + _APART / dt
-        speed, way, _ = _response(a, b, dt)
-        step[_U_BY_GUST], step[_X_BY_GUST] = speed / inertia, way / inertia
         step[_UU : _XG + 1] = 0.0
         # what the force does that comes up within the step
         for node, weight in zip(_NODES, _WEIGHTS):
-            speed, way, left = _response(a, b, node * dt)
+            by_a, by_b = -math.expm1(-a * node * dt), -math.expm1(-b * node * dt)
+            speed, way = _response(a, b, by_a, by_b)
             speed, way = speed / inertia, way / inertia
             part = weight * dt * 2.0 * b * slow.gust_m_s2**2
             step[_UU] += part * speed * speed
             step[_UX] += part * speed * way
             step[_XX] += part * way * way
-            step[_UG] += part * speed * left
-            step[_XG] += part * way * left
+            step[_UG] += part * speed * (1.0 - by_b)
+            step[_XG] += part * way * (1.0 - by_b)
+            if node == 0.5:
+                speed, way = _response(a, b, by_a * (2.0 - by_a), by_b * (2.0 - by_b))
+                step[_U_BY_GUST], step[_X_BY_GUST] = speed / inertia, way / inertia
 
 
 @compiled(inline=True, uncounted=True)

@@ -31,7 +31,6 @@ from shipdrag_ros.replay import (
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.playback import (
     StopTime,
-    attached_ship,
     refuse_without_input,
     ship_of,
     told_beside,
@@ -88,7 +87,7 @@ def diagnose_runs(
     refuse_mixed(runs, given)
     alone = stop is None and given is None and all(window is None for _, window in runs)
     asked = _Together(runs, facts, earlier, progress)
-    if alone and not any(attached_ship(run) for run, _ in runs):
+    if alone and not any(run.ship for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
         sailing = asked.sailing(None, f'No coastdown was found: {why}.', facts)
         return asked.unused(sailing, facts), None
@@ -110,8 +109,7 @@ def diagnose_runs(
             coastdowns=len(seen.coasts),
         )
     except ShipdragError:
-        for line in seen.warnings:  # no notes hold them
-            listener.log(line)
+        listener.log(*seen.warnings)  # no notes hold them
         raise
     unused = tuple(f'no coastdown was found {each}' for each in seen.without if seen.coasts)
     found = replace(found, notes=(*found.notes, *seen.warnings, *unused))
@@ -229,15 +227,13 @@ def coasts_of(
     """
     refuse_mixed(runs, given)
     seen = _found(listener, runs, given, progress)
-    for line in seen.warnings:  # a diagnosis has them among its notes
-        listener.log(line)
+    listener.log(*seen.warnings)  # a diagnosis has them among its notes
     if not (seen.coasts or (whole and seen.whole)):
         raise DiagnosisError(
             f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
             'was stopped after steady sailing'
         )
-    for each in seen.without:
-        listener.log(f'no coastdown was found {each}')
+    listener.log(*(f'no coastdown was found {each}' for each in seen.without))
     return (seen.whole if whole and seen.whole else seen.coasts), seen.ship, seen.parameters
 
 
@@ -288,7 +284,7 @@ def _found(
     warnings: list[str] = []
     for run, _ in runs:
         refuse_without_input(run)
-    known = filter(None, (attached_ship(run) for run, _ in runs))
+    known = filter(None, (run.ship for run, _ in runs))
     ship, parameters = given or next(known, None) or ship_of(runs[0][0], None), None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')

@@ -5,21 +5,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.coastdown.running import too_vague
+from shipdrag_ros.coastdown.running import speed_at_rest, too_vague
 from shipdrag_ros.display import Table, clock, ship_speed, speed_unit, utc, way
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast.followed import Checked, Followed, Passed
 from shipdrag_ros.forecast.foretell import HullNow, foretell, if_stopped
-from shipdrag_ros.forecast.result import Band, Forecast, Milestone
+from shipdrag_ros.forecast.result import NO_WAY, Band, Forecast, Milestone
 from shipdrag_ros.library.shown import Shown, drawing
 from shipdrag_ros.replay import accepted_samples
 from shipdrag_ros.replay.coasts import coast_windows
@@ -66,6 +66,17 @@ class GlideForecast:
     why: str = ''
     followed: Followed | None = None
 
+    def table(self) -> Table:
+        """
+        Show it beside what followed, in even steps of the speed.
+        """
+        assert self.checked is not None
+        even = _evenly(self.checked.forecast, self.ship.mass_kg)
+        rows = tuple(map(Passed, even.milestones))
+        if self.followed is not None:
+            rows = self.followed.beside(even, self.stop_ns).milestones
+        return milestone_table(rows, self.ship.mass_kg)
+
 
 @dataclass(frozen=True, repr=False)
 class Forecasts(Shown):
@@ -108,13 +119,13 @@ class Forecasts(Shown):
 
     def table(self) -> Table:
         """
-        Show the milestones of each forecast, with when it was made.
+        Show each forecast in even steps of the speed, with when it was made.
         """
         columns: tuple[str, ...] = ()
         rows: list[tuple[str, ...]] = []
         for each in self.made:
             if each.checked is not None:
-                part = milestone_table(each.checked.milestones, each.ship.mass_kg)
+                part = each.table()
                 columns = ('made after', *part.columns)
                 rows += [(clock(each.after_s), *row) for row in part.rows]
         return Table(columns, tuple(rows))
@@ -343,7 +354,7 @@ class IfStopped(Shown):
         said = '; '.join(milestone_sentence(each.foretold, mass) for each in shown)
         when = f'at {utc(self.forecast.made_ns)}'
         begun = f'Gliding already {when}' if self.gliding else f'If the engine were stopped {when}'
-        return (f'{begun}, at {now} {self.measured}, by {self.hull}: {said}.',)
+        return (f'{begun}, at {now} {self.measured}, by {self.hull}: {said or NO_WAY}.',)
 
     @property
     def passed(self) -> tuple[Passed, ...]:
@@ -352,9 +363,11 @@ class IfStopped(Shown):
 
     def table(self) -> Table:
         """
-        Show when and how far on she would have each lower speed.
+        Show when and how far on she would have each lower speed, in even steps.
         """
-        return milestone_table(self.passed, self.ship.mass_kg, followed=False)
+        even = _evenly(self.forecast, self.ship.mass_kg)
+        rows = tuple(map(Passed, even.milestones))
+        return milestone_table(rows, self.ship.mass_kg, followed=False)
 
     def _title(self) -> str:
         return f'if stopped at {utc(self.forecast.made_ns)}'
@@ -399,6 +412,7 @@ def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:
         last.ship,
         speed,
         now_ns,
+        rest_m_s=speed_at_rest(last.ship),
         speed_sd_m_s=sd,
         gliding=gliding,
         speeds_m_s=last.parameters.forecast_speeds,
@@ -420,8 +434,8 @@ def _hull(coastdown: EndedCoastdown) -> HullNow:
     assert coastdown.estimate is not None
     curve = coastdown.estimate.valid_curve
     curve = curve if len(curve) > 1 else coastdown.estimate.curve
-    named = f'the coastdown of {utc(coastdown.start_ns)}'
-    return HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, named)
+    known = curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2
+    return HullNow.of_run(*known, coastdown.start_ns)
 
 
 def _recent(run: RunResult) -> tuple[Window, Series, str]:
@@ -465,6 +479,22 @@ def _was(value: float | None, was_s: float | None, show: Callable[[float], str])
 def _cells(band: Band, show: Callable[[float], str]) -> tuple[str, ...]:
     """Return a median, and its band."""
     return show(band.median), f'{show(band.low)} to {show(band.high)}'
+
+
+_ROWS = 8  # at most, beside the first
+
+
+def _evenly(forecast: Forecast, mass_kg: float) -> Forecast:
+    """Return a forecast that speaks of even steps of the speed, down to its last target."""
+    if not forecast.targets_m_s:
+        return forecast
+    unit, _ = speed_unit(mass_kg)
+    top, last = forecast.speed_m_s[0] / unit, forecast.targets_m_s[-1] / unit
+    size = 10.0 ** math.floor(math.log10((top - last) / _ROWS))
+    step = next(each * size for each in (1, 2, 5, 10) if each * size * _ROWS >= top - last)
+    levels = step * np.arange(math.ceil(top / step) - 1, 0, -1)
+    even = tuple(float(each) * unit for each in levels if each >= last)
+    return replace(forecast, targets_m_s=even or forecast.targets_m_s[-1:])
 
 
 def _apart(compared: Sequence[Passed], mass_kg: float) -> list[Passed]:

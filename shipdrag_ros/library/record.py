@@ -28,11 +28,11 @@ from shipdrag_ros.library.replaying import Notes, refuse_two_ships, replay_run
 from shipdrag_ros.library.shown import Shown, ShownResistance, drawing, says_it_in_python, writing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
-from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, attached_ship
+from shipdrag_ros.replay.playback import StopTime
 from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve, together
 from shipdrag_ros.replay.tables import document
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import SHIP_FILE, Ship
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -216,7 +216,7 @@ class Record(Shown):
     @property
     def ship(self) -> Ship | None:
         """The ship given, or the one attached to the first run; None: not known."""
-        return self.given or attached_ship(self.runs[0])
+        return self.given or self.runs[0].ship
 
     @property
     def truth(self) -> TrueCurve | None:

@@ -18,7 +18,6 @@ from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.playback import (
     StopTime,
-    attached_ship,
     refuse_without_input,
     ship_of,
     told_beside,
@@ -34,9 +33,9 @@ _MOVING_M_S = 0.5
 class Listener(Protocol):
     """Receives lines, and how far the work is."""
 
-    def log(self, text: str) -> None:
+    def log(self, *texts: str) -> None:
         """
-        Take a line that is not part of the result.
+        Take lines that are not part of the result.
         """
 
     def progress(self, text: str) -> AbstractContextManager[PartDone]:
@@ -58,11 +57,11 @@ class Notes:
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def log(self, text: str) -> None:
+    def log(self, *texts: str) -> None:
         """
-        Keep a line.
+        Keep lines.
         """
-        self.lines.append(text)
+        self.lines += texts
 
     def progress(self, text: str) -> AbstractContextManager[PartDone]:
         """
@@ -117,7 +116,7 @@ def refuse_two_ships(runs: Iterable[tuple[Run, Ship | None]]) -> None:
     """
     named: dict[str, str] = {}
     for run, given in runs:
-        ship = given or attached_ship(run)
+        ship = given or run.ship
         if ship is not None and ship.name:
             named.setdefault(ship.name, run.name)
     if len(named) > 1:

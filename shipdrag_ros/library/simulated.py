@@ -22,10 +22,10 @@ from shipdrag_ros.library.record import Record, ShipGiven, ship_of
 from shipdrag_ros.library.replaying import Listener, Notes
 from shipdrag_ros.library.shown import says_it_in_python
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.playback import PARAMETERS_FILE, SHIP_FILE
+from shipdrag_ros.replay.playback import PARAMETERS_FILE
 from shipdrag_ros.replay.run_result import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block
-from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
+from shipdrag_ros.ship import SHIP_FILE, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import STANDARD_INPUTS, START_NS, Scenario, sense, standard_sensors
 from shipdrag_ros.simulation.effect import DAY_S
 from shipdrag_ros.simulation.effects import find, parse, terms, values_of

@@ -17,7 +17,7 @@ from shipdrag_ros.errors import FleetError, ShipFileError
 from shipdrag_ros.library.record import Resistance
 from shipdrag_ros.library.replaying import Listener, Notes
 from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, writing
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import SHIP_FILE, Ship
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
 
 if TYPE_CHECKING:
@@ -254,7 +254,7 @@ def _ships(
     listener: Listener, store: Path
 ) -> tuple[dict[str, Ship], dict[str, Sequence[HullEvent]]]:
     """Return ship files and events that the store keeps; say which cannot be used."""
-    from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE
+    from shipdrag_ros.fleet.find import EVENTS_FILE
     from shipdrag_ros.fleet.store import read_events, ship_texts
 
     ships: dict[str, Ship] = {}
@@ -266,8 +266,7 @@ def _ships(
             except ShipFileError as error:
                 listener.log(f'{error}\nits prices are not used')
         events[name], problems = read_events(files.get(EVENTS_FILE, ''))
-        for problem in problems:
-            listener.log(f'{name}: {problem}')
+        listener.log(*(f'{name}: {problem}' for problem in problems))
     return ships, events
 
 

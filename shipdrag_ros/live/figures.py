@@ -17,12 +17,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from shipdrag_ros.coastdown.events import ENDED_BY
-from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT, utc
+from shipdrag_ros.coastdown.running import speed_at_rest
+from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.forecast.foretell import HullNow, if_stopped
-from shipdrag_ros.forecast.result import places
+from shipdrag_ros.forecast.result import NO_WAY, places
 from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure, PastRun
 from shipdrag_ros.samples import GEODETIC, KIND, SECOND_NS, Block, Channel, Float64
 from shipdrag_ros.ship import Ship
@@ -162,13 +163,16 @@ def _if_stopped(
         return {'why': 'no speed is read'}
     try:
         if run is not None and run.curve is not None:
-            curve, of = run.curve, f'the coastdown of {utc(run.start_ns)}'
-            hull = HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, of)
+            known = run.curve.speed_m_s, run.curve.resistance_m_s2, run.curve.sigma_m_s2
+            hull = HullNow.of_run(*known, run.start_ns)
         else:
             hull = HullNow.of_file(ship)
-        found = if_stopped(hull, ship, speed_m_s, now_s * SECOND_NS)
+        now_ns = now_s * SECOND_NS
+        found = if_stopped(hull, ship, speed_m_s, now_ns, rest_m_s=speed_at_rest(ship))
     except ShipdragError as error:
         return {'why': str(error)}
+    if not found.targets_m_s:
+        return {'why': NO_WAY}
     part = forecast_part(ComingGlide(found.made_ns, found.in_time()), ship)
     return {**part, 'rows': [], 'hull': hull.source}
 

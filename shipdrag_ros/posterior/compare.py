@@ -348,8 +348,8 @@ class Comparing:
         """Return the likeliest family of a hypothesis: number, mean and precision (p,)."""
         families = self.runs.priors(fit.hypothesis, fit.at)
         total = np.sum(self.equations(fit), axis=0)
-        logs, _, _ = solve(total[None], families.mean, families.precision, 0, 0)
-        best = int(np.argmax(logs[0] + families.log_chance))
+        logs = evidences(total[None], families.mean, families.precision)[0]
+        best = int(np.argmax(logs + families.log_chance))
         return best, families.mean[best], families.precision[best]
 
     def white(self, j: int, table: RunTable, like: RunSight) -> Float64:
@@ -703,9 +703,13 @@ class Comparing:
     ) -> tuple[Float64, Float64, Float64]:
         """Return log evidence (s,), and mean and variance of the effects' unknowns (s, q)."""
         first, q = self.runs.size, len(fit.hypothesis.unknowns)
-        logs, steps, variances = solve(products, families.mean, families.precision, first, q)
-        logs = logs + families.log_chance
-        own = steps[..., first : first + q]
+        every = np.ones((len(products), len(families.mean)), np.bool_)
+        logs, steps, covariance = solve(
+            products, families.mean, families.precision, every, first, q
+        )
+        logs = logs.reshape(every.shape) + families.log_chance
+        own = steps[:, first : first + q].reshape(*every.shape, q)
+        variances = np.diagonal(covariance, axis1=1, axis2=2).reshape(own.shape)
         for i in half(fit.hypothesis, 0):
             sd = np.sqrt(np.maximum(variances[..., i], 1e-300))
             logs = logs + math.log(2.0) + log_ndtr((fit.at[first + i] + own[..., i]) / sd)
@@ -837,12 +841,13 @@ def _cost(total: Float64, families: Families, step: Float64) -> float:
 
 def _mean_step(total: Float64, families: Families) -> tuple[float, Float64]:
     """Return log evidence by the linear model, and the step to its mean."""
-    logs, steps, _ = solve(total[None], families.mean, families.precision, 0, 0)
-    weighted = logs[0] + families.log_chance
+    every = np.ones((1, len(families.mean)), np.bool_)
+    logs, steps, _ = solve(total[None], families.mean, families.precision, every, 0, 0)
+    weighted = logs + families.log_chance
     whole = float(np.logaddexp.reduce(weighted))
     if not math.isfinite(whole):
         return whole, np.full(steps.shape[-1], np.nan)
-    return whole, np.exp(weighted - whole) @ steps[0]
+    return whole, np.exp(weighted - whole) @ steps
 
 
 def replace_table(table: RunTable, along: Float64, rest: Float64, p: int) -> RunTable:

@@ -26,9 +26,9 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.inference.learning import Seen, learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.linear import (
+    ALONE,
     Families,
-    inverted,
-    of_family,
+    evidences,
     solve,
     whitened_products,
 )
@@ -147,8 +147,7 @@ class NormalMixture(NamedTuple):
 
     def through(self, columns: Float64) -> tuple[Float64, Float64]:
         """Return means and variances (m, v) of what columns (p, v) make of the unknowns."""
-        variance = np.einsum('pv,mpq,qv->mv', columns, self.covariance, columns, optimize=True)
-        return self.mean @ columns, variance
+        return self.mean @ columns, np.sum(columns * (self.covariance @ columns), axis=1)
 
 
 @dataclass(frozen=True)
@@ -162,7 +161,7 @@ class RunPosterior:
     mean, covariance : (p,), (p, p)
         Of the mixture over families and settings of the noise.
     force
-        That mixture, of the coefficients of forces less their mean.
+        That mixture, of the coefficients of forces that are free, less their mean.
     family : (f,)
         Probability of each family of `problem.families`.
     noise
@@ -205,10 +204,9 @@ def mix(
     kept, step, covariance
         Of those that count, as `NormalMixture` has them.
     """
-    s, f, p = len(products), len(families.log_chance), families.mean.shape[1]
-    t = len(taught.log_chance)
-    logs, _, _ = solve(products, families.mean, families.precision, 0, 0)
-    of_taught, _, _ = solve(products, taught.mean, taught.precision, 0, 0)
+    s, f, t = len(products), len(families.log_chance), len(taught.log_chance)
+    logs = evidences(products, families.mean, families.precision)
+    of_taught = evidences(products, taught.mean, taught.precision)
     for k in range(s):
         logs[k] -= 0.5 * log_det[k]
         of_taught[k] -= 0.5 * log_det[k]
@@ -220,14 +218,9 @@ def mix(
                 of_family_q = np.exp(logs[k, q] - top + families.log_chance[q])
                 weight[k, q] = prior[k] * of_family_q / alike
     weight /= weight.sum()
-    which = np.argwhere(weight >= _LEAST * weight.max())
-    m = len(which)
-    kept, step, covariance = np.empty(m), np.empty((m, p)), np.empty((m, p, p))
-    for j in range(m):
-        k, q = which[j]
-        _, step[j], lower, scale = of_family(products[k], families.mean[q], families.precision[q])
-        covariance[j] = inverted(lower, scale)
-        kept[j] = weight[k, q]
+    counts, p = weight >= _LEAST * weight.max(), families.mean.shape[1]
+    kept = weight.ravel()[counts.ravel()]
+    _, step, covariance = solve(products, families.mean, families.precision, counts, 0, p)
     return weight, kept / kept.sum(), step, covariance
 
 
@@ -281,14 +274,11 @@ def _mixed(problem: RunModel, taught: FamilySet, now: Float64, settings: Setting
 
 
 def _of_force(problem: RunModel, found: _Averaged) -> NormalMixture:
-    """Return the mixture of the coefficients of forces, less their mean."""
+    """Return the mixture of the coefficients of forces that are free, less their mean."""
     weight, mean, covariance = found.free
-    k, free = problem.coefficients, problem.free[problem.free < problem.coefficients]
-    many, f = np.arange(len(weight)), len(free)
-    means, spread = np.zeros((len(many), k)), np.zeros((len(many), k, k))
-    means[:, free] = mean[:, :f] - found.step[free]
-    spread[np.ix_(many, free, free)] = covariance[:, :f, :f]
-    return NormalMixture(weight, means, spread)
+    free = problem.free_forces
+    f = len(free)
+    return NormalMixture(weight, mean[:, :f] - found.step[free], covariance[:, :f, :f])
 
 
 def _seen(problem: RunModel, now: Float64) -> Seen:
@@ -302,7 +292,7 @@ class _Linear(NamedTuple):
 
     misfit: float  # chi^2 of the rows
     log_evidence: Float64  # (f,)
-    step: Float64  # (f, free)
+    step: Float64  # (free,), of the likeliest
 
 
 def _each_family(
@@ -314,8 +304,10 @@ def _each_family(
     misfit = float(products[0, 0, 0])
     products *= min(1.0, n / misfit)
     priors = problem.families.about(now, problem.free)
-    logs, steps, _ = solve(products, priors.mean, priors.precision, 0, 0)
-    return _Linear(misfit, logs[0] + priors.log_chance, steps[0])
+    logs = evidences(products, priors.mean, priors.precision) + priors.log_chance
+    best = [int(np.argmax(logs))]
+    _, step, _ = solve(products, priors.mean[best], priors.precision[best], ALONE, 0, 0)
+    return _Linear(misfit, logs[0], step[0])
 
 
 def _objective(problem: RunModel, now: Float64, misfit: float, which: int) -> float:
@@ -345,7 +337,7 @@ def _begun(problem: RunModel, seen: Float64) -> tuple[RunModel, Float64]:
     white = white._replace(variance=white.variance + rough**2)
     linear = _each_family(problem, now, (table, white), typical)
     which = int(np.argmax(linear.log_evidence))
-    now[problem.free] += linear.step[which]
+    now[problem.free] += linear.step
     level = problem.families.level
     return replace(problem, families=problem.families.of(level == level[which])), now
 
@@ -357,7 +349,7 @@ def _climbed(problem: RunModel, now: Float64, typical: Settings) -> Float64:
         which = int(np.argmax(linear.log_evidence))
         least = before = _objective(problem, now, linear.misfit, which)
         part, step = 1.0, np.zeros(len(now))
-        step[problem.free] = linear.step[which]
+        step[problem.free] = linear.step
         for _ in range(_HALVINGS):
             trial = now + part * step
             predicted = predict(problem.forces, trial, problem.grid_s, problem.rows)

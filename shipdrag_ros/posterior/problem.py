@@ -158,6 +158,11 @@ class RunModel:
         """Which unknowns some family leaves open."""
         return np.flatnonzero(self.families.precision.min(axis=0) < LEFT_OPEN)
 
+    @property
+    def free_forces(self) -> Int64:
+        """Which of them are coefficients of forces: the first."""
+        return self.free[self.free < self.coefficients]
+
     @cached_property
     def taught(self) -> FamilySet:
         """One family a hypothesis, with its mean and variance: noise is learnt by these."""

@@ -19,7 +19,8 @@ _BAND = 0.95
 _NORMAL = 1.959964  # sd of a normal distribution within which so much is
 _FARTHEST = (1.0 - _BAND) ** -0.5  # sd of any (Chebyshev)
 _BAND_AT = 8  # speeds at which the band of a mixture is sought
-_HALVINGS = 12
+_STEPS = 4096  # from 0 to the farthest
+_SLOPE, _BY_SLOPE = 0.09, 6  # of the probability there, roughly, and how often it is followed
 _ROUNDING = 1e-12  # of a correlation
 
 
@@ -35,13 +36,9 @@ class ReadOut:
         dr/dv.
     by_current_1_s : (m,)
         By how much r is another where the current is another: their covariance, as a slope.
-    parts_m_s2
-        Parts of sigma by cause (m,): `n_r`, `log`, `ground` (its scale), `held_force`, `wind`,
-        `depth`, `law` and `noise`, whose squares add up to its square. Each is what would go if
-        the cause were known, of what those before it leave.
-    shared_m_s2 : (m,)
-        What the errors of the ship file's curve and of the instruments as they are expected,
-        which are those of her other runs too, put into sigma.
+    cross : (m, p)
+        Covariance with all unknowns, within the band.
+    found
     """
 
     speed_m_s: Float64
@@ -50,14 +47,58 @@ class ReadOut:
     slope_1_s: Float64
     slope_sigma_1_s: Float64
     by_current_1_s: Float64
-    parts_m_s2: dict[str, Float64]
-    shared_m_s2: Float64
+    cross: Float64
+    found: RunPosterior
+
+    @property
+    def n_r_m_s2(self) -> Float64:
+        """The part of sigma that would go if n_r were known."""
+        at = self.found.problem.coefficients + motion.INERTIA
+        part: Float64 = np.abs(self.cross[:, at]) / np.sqrt(self.found.covariance[at, at])
+        return np.minimum(part, self.sigma_m_s2)
 
     @property
     def repeatable_m_s2(self) -> Float64:
         """sigma without what n_r adds, which repeats from run to run."""
-        of_n_r = self.parts_m_s2['n_r']
-        return np.sqrt(np.maximum(self.sigma_m_s2**2 - of_n_r**2, 0.0))
+        return np.sqrt(np.maximum(self.sigma_m_s2**2 - self.n_r_m_s2**2, 0.0))
+
+    @property
+    def shared_m_s2(self) -> Float64:
+        """
+        What the errors of the ship file's curve and of the instruments as they are expected,
+        which are those of her other runs too, put into sigma (m,).
+
+        A posterior covariance V is V (P + D) V, of the errors of prior P and of those of the
+        data D.
+        """
+        causes, problem = _causes(self.found), self.found.problem
+        which = [*range(problem.of_hull), *causes['log'], *causes['ground']]
+        prior = self.found.family @ (1.0 / problem.families.precision)
+        shared: Float64 = np.sqrt(self.cross[:, which] ** 2 @ (1.0 / prior[which]))
+        return shared
+
+    @property
+    def parts_m_s2(self) -> dict[str, Float64]:
+        """
+        Parts of sigma by cause (m,): `n_r`, `log`, `ground` (its scale), `held_force`, `wind`,
+        `depth`, `law` and `noise`, whose squares add up to its square.
+
+        Each is what would go if the cause were known, of what those before it leave (a Cholesky
+        factor has them).
+        """
+        causes, variance = _causes(self.found), self.sigma_m_s2**2
+        order = [which for each in causes.values() for which in each]
+        covariance = self.found.covariance[np.ix_(order, order)]
+        sd = np.sqrt(np.diag(covariance))
+        # unknowns that follow from others by all digits count where they stand first
+        lower = np.linalg.cholesky(covariance / np.outer(sd, sd) + _ROUNDING * np.eye(len(order)))
+        due = np.linalg.solve(lower, (self.cross[:, order] / sd).T) ** 2
+        parts, first = {}, 0
+        for name, which in causes.items():
+            parts[name] = due[first : first + len(which)].sum(axis=0)
+            first += len(which)
+        parts['noise'] = np.maximum(variance - due.sum(axis=0), 0.0)
+        return {name: np.sqrt(np.minimum(part, variance)) for name, part in parts.items()}
 
 
 def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = ()) -> ReadOut:
@@ -87,7 +128,7 @@ def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = 
     variance = np.einsum('km,mk->m', columns, cross[:, :k])
     current = k + motion.CURRENT
     by_current = cross[:, current] / covariance[current, current]
-    half = _half_band(found.force, columns)
+    half = _half_band(found.force, columns[problem.free_forces])
     variance, cross = variance * half**2, cross * half[:, None]
     of_slope = np.einsum('km,kl,lm->m', slopes, covariance[:k, :k], slopes)
     return ReadOut(
@@ -97,8 +138,8 @@ def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = 
         known[1] + theta @ slopes,
         np.sqrt(of_slope),
         by_current,
-        _parts(found, cross, variance),
-        _shared(found, cross),
+        cross,
+        found,
     )
 
 
@@ -118,37 +159,29 @@ def _half_band(force: NormalMixture, columns: Float64) -> Float64:
 
 @compiled
 def _quantile(weight: Float64, mean: Float64, sd: Float64) -> Float64:
-    """Return what 95 % of each mixture (m, v) of variance 1 about 0 is not beyond, by halving."""
+    """
+    Return what 95 % of each mixture (m, v) of variance 1 about 0 is not beyond, in even steps.
+
+    Sought by a usual slope, then by halving.
+    """
     m, v = mean.shape
-    half = np.empty(v)
+    half, step, at = np.empty(v), _FARTHEST / _STEPS, int(_STEPS * _NORMAL / _FARTHEST)
     for i in range(v):
-        low, high = 0.0, _FARTHEST
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
+        low, high, tries = 0, _STEPS, 0
+        while high - low > 1:
+            at = min(max(at, low + 1), high - 1)
             inside = 0.0
             for j in range(m):
                 scale = np.sqrt(2.0) * sd[j, i]
-                inside += 0.5 * weight[j] * math.erf((middle - mean[j, i]) / scale)
-                inside += 0.5 * weight[j] * math.erf((middle + mean[j, i]) / scale)
-            if inside < _BAND:
-                low = middle
-            else:
-                high = middle
-        half[i] = 0.5 * (low + high)
+                inside += 0.5 * weight[j] * math.erf((at * step - mean[j, i]) / scale)
+                inside += 0.5 * weight[j] * math.erf((at * step + mean[j, i]) / scale)
+            low, high = (at, high) if inside < _BAND else (low, at)
+            tries += 1
+            at += int(np.floor((_BAND - inside) / (_SLOPE * step)))
+            if tries > _BY_SLOPE:
+                at = (low + high) // 2
+        half[i] = (low + 0.5) * step
     return half
-
-
-def _shared(found: RunPosterior, cross: Float64) -> Float64:
-    """
-    Return the sd of r by the prior of what her runs share.
-
-    A posterior covariance V is V (P + D) V, of the errors of prior P and of those of the data D.
-    """
-    causes = _causes(found)
-    which = [*range(found.problem.of_hull), *causes['log'], *causes['ground']]
-    prior = found.family @ (1.0 / found.problem.families.precision)
-    shared: Float64 = np.sqrt(cross[:, which] ** 2 @ (1.0 / prior[which]))
-    return shared
 
 
 def _causes(found: RunPosterior) -> dict[str, list[int]]:
@@ -171,21 +204,3 @@ def _causes(found: RunPosterior) -> dict[str, list[int]]:
         first += len(each.columns)
     causes['law'] = list(range(2, problem.of_hull))
     return causes
-
-
-def _parts(found: RunPosterior, cross: Float64, variance: Float64) -> dict[str, Float64]:
-    """Return the parts of sigma, in the order of the causes (a Cholesky factor has them)."""
-    causes = _causes(found)
-    order = [which for each in causes.values() for which in each]
-    covariance = found.covariance[np.ix_(order, order)]
-    sd = np.sqrt(np.diag(covariance))
-    # unknowns that follow from others by all digits count where they stand first
-    lower = np.linalg.cholesky(covariance / np.outer(sd, sd) + _ROUNDING * np.eye(len(order)))
-    due = np.linalg.solve(lower, (cross[:, order] / sd).T) ** 2
-    ends = np.cumsum([len(each) for each in causes.values()])
-    each = np.diff(np.vstack([np.zeros(len(cross)), np.cumsum(due, axis=0)])[[0, *ends]], axis=0)
-    left = np.maximum(variance - each.sum(axis=0), 0.0)
-    return {
-        name: np.sqrt(np.minimum(part, variance))
-        for name, part in zip((*causes, 'noise'), (*each, left))
-    }

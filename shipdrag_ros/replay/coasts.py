@@ -8,6 +8,7 @@ a replay and the speed itself show.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
@@ -381,6 +382,33 @@ def _dismissed(result: ReplayResult) -> str:
     if more > 0:
         parts.append(f'and {more} more, which `shipdrag replay` lists')
     return '; '.join(parts)
+
+
+def slows_at_first(block: Block, window_s: float) -> float | None:
+    """
+    Return until when she slows from the first of some speeds on, as a ship that glides [s].
+
+    Parameters
+    ----------
+    block
+        Speeds, or places.
+    window_s
+        In which sailing is seen to be steady.
+
+    Returns
+    -------
+    float or None
+        From the first on; inf where she slows to the last; None where she sails steadily first.
+    """
+    since_s = (block.stamp_ns - block.stamp_ns.min()) * 1e-9
+    until_s = 0.0
+    while since_s.max() - until_s >= window_s:
+        rest = block[np.flatnonzero(since_s >= until_s)]
+        _, fall = _largest_fall(rest, ALL_MOTION, window_s)
+        if fall is None or fall.lost < _SLOWED or fall.start_s >= window_s:
+            return until_s or None
+        until_s += fall.end_s
+    return math.inf
 
 
 def _largest_fall(

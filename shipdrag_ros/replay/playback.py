@@ -44,10 +44,9 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Reason, UInt8
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import SHIP_FILE, Ship
 from shipdrag_ros.simulation.effects import checked
 
-SHIP_FILE = 'ship.yaml'
 PARAMETERS_FILE = 'parameters.yaml'
 WRONG_TYPE = 'type'
 StopTime = float | datetime
@@ -380,27 +379,12 @@ def ship_of(run: Run, given: Ship | None) -> Ship:
     """
     Return the ship that is given, else the one attached to a bag.
     """
-    ship = given or attached_ship(run)
+    ship = given or run.ship
     if ship is None:
         raise BagError(
             f'{run.name!r} has no {SHIP_FILE} attached or beside it; give one with --ship FILE'
         )
     return ship
-
-
-def attached_ship(run: Run) -> Ship | None:
-    """
-    Return the ship whose file is attached to a bag, or else lies beside it, which is noted.
-    """
-    text = run.attachments.get(SHIP_FILE)
-    if text is not None:
-        return Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
-    near = (each / SHIP_FILE for each in run.folders)
-    path = next((each for each in near if each.is_file()), None)
-    if path is None:
-        return None
-    run.note([f'{path} holds for this run'])
-    return Ship.load(path)
 
 
 def recorded_parameters(run: Run) -> Parameters:

@@ -27,6 +27,7 @@ from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.replay import Recorded, ReplayResult
+from shipdrag_ros.replay.coasts import slows_at_first
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SECOND_NS, Channel
 from shipdrag_ros.ship import Ship
 
@@ -255,14 +256,19 @@ def _not_found_again(result: ReplayResult) -> Iterator[str]:
             continue
         first = int(np.flatnonzero(speeds)[0])
         silent_s = (int(later.stamp_ns[first]) - one.end_ns) / SECOND_NS
-        again_s = (int(later.receive_ns[first]) - span_ns[0]) / SECOND_NS
-        last_s = (span_ns[1] - span_ns[0]) / SECOND_NS
         at = _moment(one.end_ns, span_ns)
-        yield (
+        said = (
             f'the readings of speed ceased for {silent_s:.0f} s at {at}: the coastdown ends '
-            'there, and no rest of it was found; if she went on '
-            f'without thrust, say so with --window {again_s:.0f} {last_s:.0f}'
+            'there, and no rest of it was found'
         )
+        slows_s = slows_at_first(later[np.flatnonzero(speeds)], result.parameters.slope_window_s)
+        if slows_s is not None:
+            again_s = (int(later.receive_ns[first]) - span_ns[0]) / SECOND_NS
+            last_s = min(again_s + slows_s, (span_ns[1] - span_ns[0]) / SECOND_NS)
+            said += (
+                f'; if she went on without thrust, say so with --window {again_s:.0f} {last_s:.0f}'
+            )
+        yield said
 
 
 def _unexplained(events: Sequence[Event]) -> Iterator[str]:

@@ -4,6 +4,7 @@
 from shipdrag_ros.ship.facts import Fact as Fact
 from shipdrag_ros.ship.facts import parse_fact as parse_fact
 from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3 as AIR_DENSITY_KG_M3
+from shipdrag_ros.ship.model import SHIP_FILE as SHIP_FILE
 from shipdrag_ros.ship.model import RunSheet as RunSheet
 from shipdrag_ros.ship.model import Ship as Ship
 from shipdrag_ros.ship.sections import GRAVITY_M_S2 as GRAVITY_M_S2

@@ -58,6 +58,9 @@ from shipdrag_ros.ship.sections import (
 )
 from shipdrag_ros.ship.term import LearntTerm, learnt_terms
 
+SHIP_FILE = 'ship.yaml'
+"""Attached to a bag, or beside it."""
+
 SLENDERNESS = (2.0, 15.0)  # L / V^(1/3): car to racing shell
 SLENDERNESS_MERCHANT = (4.0, 8.0)  # outside it the merchant n_r is meaningless
 SLENDERNESS_MERCHANT_TRUSTED = (4.5, 7.0)

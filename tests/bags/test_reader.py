@@ -341,7 +341,8 @@ def test_an_empty_bag_of_another_tool(tmp_path: Path) -> None:
     assert run.compression == 'none'
 
 
-def test_a_named_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / 'a.mcap')
+@pytest.mark.parametrize('name', ['a.mcap', 'a.mcap.zstd', 'a.gz'])
+def test_a_named_pipe_is_refused_and_not_waited_for(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
     with pytest.raises(BagError, match='not seekable'):
-        open_runs([tmp_path / 'a.mcap'])
+        open_runs([tmp_path / name])

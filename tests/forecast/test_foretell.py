@@ -319,7 +319,7 @@ def test_a_run_is_known_better_than_the_file_that_it_contradicts(driven: Ship) -
     fouled = glide(replace(driven, effects=(FOULED,)))
     speed = np.linspace(2.0, SPEED_M_S, 30)
     r = fouled.specific_resistance(speed)
-    hull = HullNow.of_run(speed, r, 0.02 * r, 'the last run')
+    hull = HullNow.of_run(speed, r, 0.02 * r, START_NS)
     later = if_stopped(HullNow.of_file(driven), driven, SPEED_M_S, START_NS).reaches(4.0).time_s
     sooner = if_stopped(hull, driven, SPEED_M_S, START_NS).reaches(4.0).time_s
     was = float(np.interp(-4.0, -fouled.speed_through_water_m_s, fouled.time_s)) - 1.0
@@ -340,8 +340,7 @@ def test_a_longer_run_down_delays(driven: Ship) -> None:
 def test_why_nothing_is_foretold(driven: Ship) -> None:
     with pytest.raises(EstimationError, match='neither a coastdown nor a baseline'):
         HullNow.of_file(replace(driven, baseline=None))
-    with pytest.raises(EstimationError, match='makes no way'):
-        if_stopped(HullNow.of_file(driven), driven, 0.0, START_NS)
+    assert not if_stopped(HullNow.of_file(driven), driven, 0.0, START_NS).milestones
 
 
 PATH_STOP_NS = START_NS + 300 * SECOND_NS

@@ -27,3 +27,11 @@ def test_the_second_of_a_kind_shows_the_present_speed(tmp_path, channel, measure
     found = sd.estimate(sd.read(path)).if_stopped_now()
     assert found.measured == measured
     assert found.forecast.speed_m_s[0] == pytest.approx(6.0, abs=0.02)
+
+
+def test_a_ship_at_anchor_makes_no_way_whatever_her_log_adds(tmp_path):
+    speed = np.full(len(STAMPS), 0.1)
+    block = Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed)
+    found = sd.estimate(sd.read(write_run(tmp_path / 'a.mcap', block, Ship.example())))
+    assert 'at 0.2 knots through water' in (said := found.if_stopped_now().summary())
+    assert said.endswith('she makes no way ahead, there is no glide to foretell.')

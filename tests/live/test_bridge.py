@@ -274,7 +274,12 @@ def test_the_rest_of_the_glide_is_shown_and_then_compared(bags: list[Path]) -> N
 
 def test_why_it_is_not_said_what_a_stop_would_do() -> None:
     assert Bridge().parts(0.0)['if_stopped'] == {'why': 'the ship is not known yet'}
-    assert Bridge(Ship.load(SHIP)).parts(0.0)['if_stopped'] == {'why': 'no speed is read'}
+    bridge = Bridge(Ship.load(SHIP))
+    assert bridge.parts(0.0)['if_stopped'] == {'why': 'no speed is read'}
+    stamps = 10**18 + np.arange(60) * 10**9
+    at_anchor = Block.of(Channel.SPEED_THROUGH_WATER, stamps, np.full(60, 0.1))
+    bridge.hear(Samples(at_anchor), 0.0)
+    assert 'makes no way' in bridge.parts(1.0)['if_stopped']['why']
 
 
 @pytest.mark.parametrize('first_m_s', [None, 3.0])

@@ -11,7 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shipdrag_ros.inference.linear import Families, of_family, products_of, whitened_products
+from shipdrag_ros.inference.linear import (
+    ALONE,
+    Families,
+    evidences,
+    products_of,
+    solve,
+    whitened_products,
+)
 from shipdrag_ros.inference.rows import (
     CODES,
     KIND_COUNT,
@@ -202,7 +209,7 @@ def test_a_linear_model_has_its_closed_form() -> None:
     assert weight == pytest.approx(1.0)
     # the evidence is the density of the readings under N(mean columns, columns' sd^2 columns + 1)
     log_det = whiten(rows, table, noise)
-    log_evidence, *_ = of_family(products_of(table), mean, sd**-2.0)
+    log_evidence = evidences(products_of(table)[None], mean[None], sd[None] ** -2.0)[0, 0]
     of_rows = columns.T * sd**2 @ columns + variance * np.eye(n)
     away = value - mean @ columns
     wanted = -0.5 * (away @ np.linalg.solve(of_rows, away) + np.linalg.slogdet(of_rows)[1])
@@ -226,9 +233,9 @@ def test_log_evidence_is_that_of_long_sampling(ship: Ship, seed: int) -> None:
     for _ in range(6):
         table, _ = predict(problem.forces, now, problem.grid_s, problem.rows)
         table /= np.sqrt(problem.white.variance)
-        log_evidence, step, lower, scale = of_family(products_of(table), mean - now, precision)
+        model = products_of(table)[None], mean[None] - now, precision[None]
+        (log_evidence,), (step,), (covariance,) = solve(*model, ALONE, 0, len(now))
         now = now + step
-    covariance = np.linalg.inv((lower / scale[:, None]) @ (lower / scale[:, None]).T)
     root = np.linalg.cholesky(covariance) * 1.1
     z = np.random.default_rng(seed).standard_normal((4000, len(now)))
     log_of_draw = -0.5 * (z**2).sum(axis=1) - np.log(np.diag(root)).sum()

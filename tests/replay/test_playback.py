@@ -41,7 +41,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import Recorded, ReplayResult, coast_windows, replay
 from shipdrag_ros.replay.coasts import why_no_coastdown
-from shipdrag_ros.replay.playback import attached_ship, told_beside
+from shipdrag_ros.replay.playback import told_beside
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship, StatedEffect
 from tests.runs import write_run
@@ -309,12 +309,17 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(tmp_path, ship, voy
 
 def test_the_ship_file_beside_a_bag_counts_where_none_is_attached(tmp_path, ship, voyage, capsys):
     bare = write_run(tmp_path / 'a.mcap', voyage(coast_s=60.0))
-    assert attached_ship(open_runs([bare])[0]) is None
+    assert open_runs([bare])[0].ship is None
     beside = replace(ship, name='beside')
     (tmp_path / 'ship.yaml').write_text(beside.to_yaml())
-    assert attached_ship(open_runs([bare])[0]) == beside
+    assert open_runs([bare])[0].ship == beside
+    (run,) = open_runs([bare])
+    known = run.ship
+    (tmp_path / 'ship.yaml').unlink()  # it is read once, so that no run is of two ships
+    assert run.ship is known
+    (tmp_path / 'ship.yaml').write_text(beside.to_yaml())
     own = write_run(tmp_path / 'b.mcap', voyage(coast_s=60.0), ship)
-    assert attached_ship(open_runs([own])[0]) == ship
+    assert open_runs([own])[0].ship == ship
     for verb in ('replay', 'forecast'):
         assert main([verb, str(bare)]) == 0
         assert f'{tmp_path / "ship.yaml"} holds for this run' in ''.join(capsys.readouterr())
@@ -322,7 +327,7 @@ def test_the_ship_file_beside_a_bag_counts_where_none_is_attached(tmp_path, ship
     (tmp_path / 'bag').mkdir()
     bare.rename(tmp_path / 'bag' / 'a.mcap')
     (tmp_path / 'bag/metadata.yaml').write_text(f'rosbag2_bagfile_information: {about}')
-    assert attached_ship(open_runs([tmp_path / 'bag'])[0]) == beside
+    assert open_runs([tmp_path / 'bag'])[0].ship == beside
 
 
 @pytest.mark.parametrize('verb', ['forecast', 'diagnose'])

@@ -205,14 +205,18 @@ def test_nothing_is_made_of_a_gap(tmp_path: Path, voyage, ship: Ship) -> None:
     assert 'nothing was read' in cut.text
 
 
-@pytest.mark.parametrize('gap_s', [(1300, 1420), (1210, 1900)])
-def test_the_rest_after_a_gap_is_found_or_asked_for(tmp_path: Path, ship: Ship, gap_s) -> None:
+@pytest.mark.parametrize(
+    ('gap_s', 'sails_s'),
+    [((1300, 1420), 2800), ((1210, 1900), 2800), ((1210, 1900), 2400), ((1300, 1900), 1900)],
+)
+def test_the_rest_after_a_gap_is_found_or_asked_for(tmp_path, ship: Ship, gap_s, sails_s) -> None:
     second, rng = np.arange(2800), np.random.default_rng(0)
     speed, gust = np.full(len(second), 7.0), 0.0
     for k in range(1, len(speed)):
         gust = 0.975 * gust + 1.4e-4 * rng.normal()  # correlated over 40 s
         drag = 2.6e-4 * (speed[k - 1] ** 2 - 49.0 * (k <= 1200))
         speed[k] = speed[k - 1] + (gust - drag) / 1.05
+    speed[sails_s:] = 6.0
     speed += rng.normal(0.0, 0.04, len(speed))
     block = log(speed)[(second < gap_s[0]) | (second > gap_s[1])]
     result = replayed(tmp_path, block, ship)
@@ -226,7 +230,9 @@ def test_the_rest_after_a_gap_is_found_or_asked_for(tmp_path: Path, ship: Ship, 
         assert rest
         assert 'the readings of speed ceased for' not in said
     else:
-        assert rest or f'--window {gap_s[1] + 1} 2799' in said
+        asked = [float(each) for each in re.findall(r'--window 1901 (\S+)', said)]
+        glides = [pytest.approx(sails_s, abs=60.0)] if sails_s > gap_s[1] else []
+        assert rest or asked == glides
         assert rest or 'and no rest of it was found' in said
 
 

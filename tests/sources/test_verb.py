@@ -203,10 +203,13 @@ def test_a_bag_needs_no_import(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 @pytest.mark.parametrize('option', [('--format', 'signalk'), ('--map', 'depth=v', '--rate', '1')])
 def test_no_option_lets_a_pipe_or_a_bag_in(tmp_path, capsys, option: tuple[str, ...]) -> None:
-    pipe, bag = tmp_path / 'pipe', tmp_path / 'a.mcap'
+    folder, bag = tmp_path / 'folder', tmp_path / 'a.mcap'
+    folder.mkdir()
+    pipe = folder / 'a.db3.zstd'
     os.mkfifo(pipe)  # without a writer, one that reads it waits for ever
     bag.write_bytes(b'\x89MCAP0\r\n')
-    for source, why in ((bag, 'is a bag already'), (pipe, 'is no regular file')):
+    refused = {bag: 'is a bag already', pipe: 'is no regular file', folder: "folder'"}
+    for source, why in refused.items():
         assert main(['import', str(source), '-o', str(tmp_path / 'b.mcap'), *option]) == 1
         assert why in capsys.readouterr().err
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.estimators import Estimator
-from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows, block_medians
+from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows
 from shipdrag_ros.estimation.result import AtEnd, Estimate, ResistanceCurve, Track, ValidRange
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, POSITION, Rows
+from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, POSITION, Rows, block_medians
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
@@ -392,9 +392,8 @@ def _slowing(part: ReadOut) -> slice:
 
 def _of_n_r(part: ReadOut, ship: Ship) -> Float64:
     """Return what n_r adds to sigma."""
-    found = part.parts_m_s2['n_r']
-    if found.any():
-        return found
+    if part.n_r_m_s2.any():
+        return part.n_r_m_s2
     # where the file states retardations, n_r is no unknown of the motion
     inertia = 1.0 + ship.n_r(part.speed_m_s)
     return np.abs(part.resistance_m_s2) / inertia * ship.added_mass.sd

@@ -195,7 +195,7 @@ def _sqlite_files(path: Path) -> list[Path]:
     """Return the files of a bag of rosbag2, each once where it is there packed too."""
     folder = path.parent if path.name == METADATA else path
     found = [*folder.glob('*.db3.zstd'), *folder.glob('*.db3')] if folder.is_dir() else [path]
-    once = {file.name.removesuffix('.zstd'): file for file in found}
+    once = {file.name.removesuffix('.zstd'): file for file in found if file.is_file()}
     return [once[name] for name in sorted(once, key=lambda name: (len(name), name))]
 
 
