@@ -27,7 +27,7 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
-from shipdrag_ros.simulation import EngineOrder, Sensor, Turn
+from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor, Turn
 from tests.coastdown.conftest import bits, refuse, window_itself
 
 START_NS = 1_700_000_000_000_000_000
@@ -561,6 +561,17 @@ def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn_when_it_settles(wa
     dismissed = [event for event in events if isinstance(event, NotCoastdown)]
     assert dismissed
     assert {event.reason for event in dismissed} <= {Dismissal.THRUST, Dismissal.SETTLED}
+
+
+@pytest.mark.parametrize('seed', [1, 5, 9])
+def test_less_power_in_a_rough_sea_is_no_coastdown(watch, record, sensors, seed) -> None:
+    # turns that may have been do not crowd out the levels that may come
+    rough = replace(sensors['log'], coloured=GaussMarkov(0.13, 60.0))
+    order = EngineOrder(0.0, shaft=0.5, thrust=0.25)
+    block = record(
+        sensors=(rough,), orders=(order,), seed=seed, lead_in_s=2400.0, duration_s=420.0
+    )
+    assert all(event.withdrawn for event in ended(watch(block)))
 
 
 def test_a_coastdown_that_ends_with_the_engine_is_not_withdrawn(watch, record) -> None:
