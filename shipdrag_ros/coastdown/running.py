@@ -221,7 +221,7 @@ def speed_at_rest(ship: Ship) -> float:
     """
     Return up to which speed a ship makes no way, as the regimes have it [m/s].
     """
-    return float(unwrap(rest_speed)(HullPrior.of(ship)))  # one number needs no compiler
+    return float(unwrap(rest_speed)(HullPrior.any_body(ship)))  # one number needs no compiler
 
 
 def too_vague(found: Estimate, parameters: Parameters) -> str:

@@ -17,7 +17,7 @@ Z = 1.6448536269514722
 """Standard deviations on either side of the median that hold 90 %."""
 
 NO_WAY = 'she makes no way ahead, there is no glide to foretell'
-"""Of a forecast without targets."""
+"""Why a forecast has no targets."""
 
 
 class Band(NamedTuple):

@@ -20,7 +20,7 @@ from shipdrag_ros.samples import Float64, Int64
 _FOLLOWS = 1e-14  # of a scaled diagonal
 _ROUNDING = 1e-6  # nats
 ALONE = np.ones((1, 1), np.bool_)
-"""What `solve` is asked for of one model."""
+"""`wanted` of one model."""
 
 # Sums may be taken in any order, so that they are vectorised; the order is
 # fixed when compiled, and by where a line begins, not by where the data lie.

@@ -485,7 +485,7 @@ _ROWS = 8  # at most, beside the first
 
 
 def _evenly(forecast: Forecast, mass_kg: float) -> Forecast:
-    """Return a forecast that speaks of even steps of the speed, down to its last target."""
+    """Return a forecast that speaks of even steps of the speed above its last target."""
     if not forecast.targets_m_s:
         return forecast
     unit, _ = speed_unit(mass_kg)

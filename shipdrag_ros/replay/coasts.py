@@ -398,7 +398,8 @@ def slows_at_first(block: Block, window_s: float) -> float | None:
     Returns
     -------
     float or None
-        From the first on; inf where she slows to the last; None where she sails steadily first.
+        From the first on; inf where she slows to the last; None where she sails steadily first,
+        or too little shows it.
     """
     since_s = (block.stamp_ns - block.stamp_ns.min()) * 1e-9
     until_s = 0.0

@@ -19,6 +19,7 @@ LOST = 16.0
 """Nats below the best of a history that is dropped."""
 _ALIKE_S = 8.0  # two stops so near each other are one ...
 _SAME, _SAME_SPREAD = 0.6, 2.0  # ... where states differ by less: in sd, in variance
+_SAME_LEVEL = 0.05  # ln: the power at which a turn ends
 _THIN_EVERY, _SLOW_EVERY = 6, 3  # bins
 _HALVINGS = 24  # in search of the weight of the last that is kept
 _NO_RAMP_S = 1e-3  # nothing pushed before
@@ -479,10 +480,12 @@ def _children(
 
 @compiled(uncounted=True)
 def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
-    """Say whether two histories differ by moments alone that nothing to come can tell."""
+    """Say whether two histories differ by moments alone, which what comes hardly tells."""
     f, v = bank.row[i], bank.row[j]
     last = f.count - 1
     if f.count != v.count or f.liar != v.liar or f.kind != v.kind or f.regime != v.regime:
+        return False
+    if f.regime == s.GLIDE or (f.regime == s.TURN and abs(f.before - v.before) > _SAME_LEVEL):
         return False
     if last < 0:
         return True
@@ -556,16 +559,14 @@ def _merge(bank: Histories, now_s: float, pace: float) -> None:
             continue
         a, b = bank.row[into].weight, bank.row[i].weight
         total = max(a, b) + math.log1p(math.exp(-abs(a - b)))
-        part = math.exp(b - total)
-        last = bank.row[i].count - 1
+        part, last = math.exp(b - total), bank.row[i].count - 1
         one, other = bank.switched[into, last], bank.switched[i, last]
-        at = one.at + part * (other.at - one.at)
-        ramp = one.ramp + part * (other.ramp - one.ramp)
+        at, off = one.at, other.at - one.at
         if b > a:
             _copy(bank, i, into)
         bank.row[into].weight = total
-        if last >= 0:
-            one.at, one.ramp = at, ramp
+        if last >= 0 and abs(off) <= _ALIKE_S * pace:
+            one.at = at + part * off
     bank.used[0] = kept
 
 
