@@ -226,9 +226,10 @@ def test_the_rest_after_a_gap_is_found_or_asked_for(tmp_path, ship: Ship, gap_s,
     said = ' '.join(words.run_warnings(result))
     rest = [each for each in result.coastdowns if each.cuts]
     # ten seconds of a glide, then nothing: a lower level since is as likely, and that is said
-    assert told or 'P(gliding)' in result.not_coastdowns[0].text
-    if not told:
+    if not told and (gap_s, sails_s) == ((1210, 1900), 2800):
+        assert 'P(gliding)' in result.not_coastdowns[0].text
         return
+    assert told
     if gap_s[1] < 1500:
         assert rest
         assert 'the readings of speed ceased for' not in said
