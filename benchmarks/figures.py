@@ -79,7 +79,7 @@ FIGURES = tuple(Figure(*each) for each in (
      'node_latency', r'\| 1 Hz \| ([\d.]+) / (\d+) \| ([\d.]+) % \|',
      'median {0} ms, 99 % within {1} ms; {2} % of a core'),
     ('Is a name of `diagnose` right? World B, by another author, one effect hidden',
-     'diagnosis_score', r'something is named \| (\d+ of \d+) \|', '{0}'),
+     'diagnosis_score', r'something is named \| (\d+ of \d+) \| (\d+ of \d+)', '{0}, with facts {1}'),
     ('Is something named where nothing is hidden? World B',
      'diagnosis_score', r'nothing hidden: false name; plain "none" \| (\d+); (\d+) of (\d+)',
      '{0} false names and {1} plain `none` in {2}; the rest are sets that hold "nothing"'),
