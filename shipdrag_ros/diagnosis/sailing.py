@@ -47,7 +47,6 @@ from shipdrag_ros.simulation.effect import Effect, Measure, Scope, WithoutBaseli
 from shipdrag_ros.simulation.effects import LIBRARY, inseparable
 
 _LOG = 'speed_through_water'
-_WIDE = 10.0  # prior widths of the effects while noise is learnt
 _SPLINES = 6  # over the speed, of an error without a name
 _NOISE = (
     priors.SAILING_LOG,
@@ -143,7 +142,7 @@ class SailingModel:
         typical = max(float(np.median(np.abs(residual))), 1e-3)
         units = np.array([each.mean for each in _NOISE])
         units[:2] *= typical
-        slopes = white.factor @ rough.slopes * _WIDE
+        slopes = white.factor @ rough.slopes
         open_ = slopes @ slopes.T
 
         def cost(x: Float64) -> float:
