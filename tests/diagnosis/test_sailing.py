@@ -41,6 +41,8 @@ class Sailing:
         East, north.
     courses_deg, speeds_m_s
         Of legs of 12 minutes, taken in turn.
+    place_sd_m, wander_m_s
+        Noise of each position; how her speed wanders.
     """
 
     scale: float = 0.0
@@ -51,6 +53,8 @@ class Sailing:
     courses_deg: tuple[float, ...] = (10.0, 130.0, 250.0, 70.0, 190.0, 310.0)
     speeds_m_s: tuple[float, ...] = (3.0, 5.5, 4.0, 7.0)
     hours: float = 2.5
+    place_sd_m: float = 3.0
+    wander_m_s: float = 0.1
     geodetic: bool = False
     sources: tuple[Channel, ...] = (Channel.POSITION, Channel.HEADING)
 
@@ -62,7 +66,7 @@ class Sailing:
         courses = np.unwrap(np.radians(self.courses_deg))
         course = follow(courses[leg % len(courses)], 15.0)
         speed = follow(np.array(self.speeds_m_s)[leg % len(self.speeds_m_s)], 40.0)
-        speed += wander(rng, time, 0.1, 60.0)
+        speed += wander(rng, time, self.wander_m_s, 60.0)
         yaw = course + wander(rng, time, 0.02, 8.0)
         leeway = 0.05 * np.sin(yaw - 1.0)  # pushed aside by a wind, up to 3 degrees
         water = [c + wander(rng, time, 0.03, 1500.0) for c in self.current_m_s]
@@ -73,7 +77,7 @@ class Sailing:
         log += wander(rng, time, 0.04, 50.0) + rng.normal(0.0, 0.06, len(time))
         stamps = np.round(time * 1e9).astype(np.int64) + 10**18
         place = np.cumsum(np.array([east, north]).T, axis=0) * (1.0 + self.radar_scale)
-        place += rng.normal(0.0, 3.0, place.shape)
+        place += rng.normal(0.0, self.place_sd_m, place.shape)
         over = np.hypot(east, north) * (1.0 + self.radar_scale) + rng.normal(0.0, 0.08, len(time))
         values = {Channel.POSITION: place, Channel.HEADING: yaw, Channel.SPEED_OVER_GROUND: over}
         blocks = [Block.of(Channel.SPEED_THROUGH_WATER, stamps, log)]
@@ -208,6 +212,13 @@ def test_units_that_were_checked_in_one_record_are_asked_about_in_the_other() ->
     assert asked((miles, False), (miles, True))
     assert not asked((miles, True), (sound, False))
     assert not asked((miles, True), (miles, True))
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_the_noise_of_fixes_on_one_course_is_neither_scale_nor_current(seed: int) -> None:
+    steady = Sailing(courses_deg=(10.0,), speeds_m_s=(8.2,), hours=0.5, geodetic=True)
+    found = found_in(replace(steady, place_sd_m=10.0, wander_m_s=0.01), seed)
+    assert found.verdict is Verdict.NONE
 
 
 def test_radar_may_be_wrong_where_the_positions_are_not_of_the_globe() -> None:
