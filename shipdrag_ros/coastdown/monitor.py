@@ -465,7 +465,7 @@ class Monitor:
         last_s = np.inf if last_ns is None else last_ns / SECOND_NS
         silent = self._ended_by in _SILENT
         heard_s = regimes.read_after(since_s) if silent else since_s
-        for each in (self._as_read(glide, regimes) for glide in regimes.glides()):
+        for each in (self._as_read(glide, regimes) for glide in regimes.glides(since_s)):
             if each.begin_s >= heard_s:
                 found.append(each)
             elif silent or (self._ended_by is not EndedBy.SPEED and each.ended_by is None):

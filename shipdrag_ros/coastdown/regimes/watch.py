@@ -55,6 +55,7 @@ _FIXES = 2.0  # in a bin: a way is from one to the next
 
 _ENDED = {
     s.LEVEL: EndedBy.ENGINE,
+    s.GLIDE: EndedBy.ENGINE,
     s.AMID: EndedBy.ENGINE,
     s.BRAKE: EndedBy.BRAKE,
     s.TURN: EndedBy.TURN,
@@ -66,6 +67,7 @@ _WHY = {
     s.BRAKE: (Dismissal.BRAKE, 'something but the water slowed her'),
     s.TURN: (Dismissal.TURN, 'she turned under power'),
     s.GLIDE_TURN: (Dismissal.TURN, 'she turned'),
+    s.GLIDE: (Dismissal.PLATEAU, 'she glided on, but slowed too little to show what slows her'),
 }
 _AGAIN = Dismissal.THRUST, 'she slowed less than water alone slows her, as if driven again'
 _REVERSED = Dismissal.ASTERN, 'a propeller was reversed'
@@ -301,11 +303,17 @@ class RegimeFilter:
         """Whether it should be asked for glides that were over before anybody noticed."""
         return len(self._out) % _ASKED_EVERY == 0
 
-    def glides(self) -> list[Dated]:
+    def glides(self, since_s: float) -> list[Dated]:
         """
         Return the coastdowns so far, in order.
+
+        None claims anything of the time before the end of the last, or before what was told.
         """
-        return [self._dated(each) for each in glides(self._spans, self._setting, self._speed)]
+        found = list[Dated]()
+        for each in glides(self._spans, self._setting, self._speed):
+            found.append(self._dated(each, since_s))
+            since_s = max(since_s, found[-1].end_s)
+        return found
 
     @property
     def _spans(self) -> Spans:
@@ -315,14 +323,17 @@ class RegimeFilter:
     def _speed(self) -> Float64:
         return np.array([out[SPEED] for out in self._out])
 
-    def _dated(self, glide: SmoothedGlide) -> Dated:
-        before, stop, start, begin, end = (self.begun_s + each for each in glide[:5])
+    def _dated(self, glide: SmoothedGlide, since_s: float) -> Dated:
+        *past, begin, end = (self.begun_s + each for each in glide[:5])
+        ran_down = not self._setting.shafts and begin - past[1] > _RAN_DOWN_S
+        before, stop, start = (min(max(each, since_s), begin) for each in past)
         cuts: list[NotCoastdown] = []
         if glide.before in (s.BRAKE, s.GLIDE_TURN):  # nothing drove her before it
             cuts.append(_cut(before, stop, *_WHY[glide.before]))
-        if not self._setting.shafts and begin - stop > _RAN_DOWN_S:
+        if ran_down:
+            how = 'ran down' if stop == past[1] else 'may have been left'
             text = (
-                f'the thrust ran down for {begin - stop:.0f} s, and was gone at the end of that, '
+                f'the thrust {how} for {begin - stop:.0f} s, and was gone at the end of that, '
                 f'± {glide.begin_sd_s:.0f} s'
             )
             cuts.append(_cut(stop, begin, Dismissal.THRUST, text))
