@@ -217,8 +217,8 @@ class Regimes:
         Return the least probability, soon after the end of a glide, that she glides.
         """
         soon = np.flatnonzero(self.time_ns > end_ns)[:_SOON]
-        chance = self.probability['run_down'] + self.probability['gliding']
-        return float(np.min(chance[soon])) if len(soon) else 0.0
+        others = [self.probability[name] for names in _BY_REGIME.values() for name in names]
+        return float(1.0 - np.max(np.sum(others, axis=0)[soon], initial=0.0)) if len(soon) else 0.0
 
     def ended_by(self, said: EndedBy, end_ns: int) -> EndedBy:
         """
