@@ -234,7 +234,7 @@ class Monitor:
             elif stop == WalkEvent.BIN:
                 events += self._vouching.explained(self._follow())
             elif stop == WalkEvent.LOOK:
-                self._vouch(int(stamp_ns[at]))
+                events += self._vouching.explained(self._vouch(int(stamp_ns[at])))
             elif stop == WalkEvent.SILENCE:
                 if not self._fall_back(int(stamp_ns[at])):
                     events += self._bear_silence(int(stamp_ns[at]))
@@ -339,7 +339,7 @@ class Monitor:
 
     # what the walk stopped for
 
-    def _vouch(self, now_ns: int) -> None:
+    def _vouch(self, now_ns: int) -> list[Event]:
         """Compare log and track, and go on with one that is sound."""
         watch, number = self._watch, now_ns // SECOND_NS
         watched = int(watch.source)
@@ -354,8 +354,7 @@ class Monitor:
         watch.doubted[:] = self._vouching.until
         if watched != NEVER and watch.doubted[watched] > number:
             self._fall_back(now_ns)
-        if watched != NEVER and newly[SOURCES].any() and self._running is None:
-            self._wake(int(watch.source), number)  # the record is judged without it
+        return self._judged_anew(number) if watched != NEVER and newly[SOURCES].any() else []
 
     def _make_room(self) -> None:
         store = make_room(
@@ -366,13 +365,36 @@ class Monitor:
         )
         self._memory = self._memory._replace(store=store)
 
-    def _wake(self, source: int, number: int) -> None:
+    def _wake(self, source: int, number: int, lead_s: int = LEAD_S) -> RegimeFilter:
         """Let the regimes take the record, from some minutes before a second on."""
         self._watch.source = source
         before, bins = self._regimes, self._vouching.sound(self._memory.bins)
-        self._regimes, self._silent = RegimeFilter(self._ship, bins, number), False
+        woken = self._regimes = RegimeFilter(self._ship, bins, number, lead_s)
+        self._silent = False
         if before is not None:
-            self._regimes.tell(before.told_s)
+            woken.tell(before.told_s)
+        return woken
+
+    def _judged_anew(self, number: int) -> list[Event]:
+        """Let the record be judged without what is doubted now, and a coastdown with it."""
+        source, before = int(self._watch.source), self._regimes
+        if self._running is None or before is None:
+            self._wake(source, number)
+            return []
+        onset = self._running.onset.start_ns // SECOND_NS
+        lead_s = number - onset + LEAD_S
+        if lead_s > self._seconds:  # no longer kept
+            return []
+        regimes = self._wake(source, number, lead_s)
+        bins = self._vouching.sound(self._memory.bins, shafts=regimes.hears_shafts)
+        until = int(self._memory.bins.filling[source])
+        while regimes.advance(bins, until):
+            pass
+        # the others were not read then, or the shafts bear out what is doubted and not them
+        if regimes.begun_s > onset or regimes.shafts_lie > 0.5 > before.shafts_lie:
+            self._regimes = before
+            return []
+        return self._decide(regimes, until)
 
     def _follow(self) -> list[Event]:
         """Let the regimes take all bins of the source watched that are whole."""
@@ -443,7 +465,7 @@ class Monitor:
         last_s = np.inf if last_ns is None else last_ns / SECOND_NS
         silent = self._ended_by in _SILENT
         heard_s = regimes.read_after(since_s) if silent else since_s
-        for each in (self._as_read(glide, regimes) for glide in regimes.glides()):
+        for each in (self._as_read(glide, regimes) for glide in regimes.glides(since_s)):
             if each.begin_s >= heard_s:
                 found.append(each)
             elif silent or (self._ended_by is not EndedBy.SPEED and each.ended_by is None):

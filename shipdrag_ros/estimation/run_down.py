@@ -249,9 +249,11 @@ def say(
             if slowed < _SLOWED and abs(of_shaft - slowed) < _ALIKE * slowed:
                 return f'{turns}, as the water turns it: the drag of its propeller is part of r'
             break
+    stops = len(rate) > _FEW and float(rate[-_FEW:].max()) < STANDS_RAD_S
+    remedy = '; give a window that begins after the shaft has stopped' if stops else ''
     return (
         f'{turns} and not as the water turns it: if it drives the ship, r may be off by its '
-        'thrust; give a window that begins after the shaft has stopped'
+        f'thrust{remedy}'
     )
 
 

@@ -9,7 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from shipdrag_ros.bags import WindowedRun, WindowSpan
-from shipdrag_ros.coastdown.events import ENDED_BY, NOT_ALL, EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.events import NOT_ALL, EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_sailing
 from shipdrag_ros.diagnosis.diagnose import with_log_track, with_whole_glides
 from shipdrag_ros.diagnosis.document import EarlierDiagnosis
@@ -375,7 +375,7 @@ def _ends(bag: str, windows: Sequence[tuple[EndedCoastdown, Window]]) -> Iterato
     for (name, _), (coastdown, _) in zip(named, windows, strict=True):
         if coastdown.ended_by not in known:
             also = f'; {coastdown.disturbed}' if coastdown.disturbed else ''
-            yield f'{name}: the coastdown ends where {ENDED_BY[coastdown.ended_by]}{also}'
+            yield f'{name}: the coastdown ends where {coastdown.why}{also}'
 
 
 def _cuts(result: ReplayResult, window: WindowSpan | None) -> Iterator[str]:

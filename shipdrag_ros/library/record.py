@@ -16,7 +16,6 @@ import numpy as np
 from shipdrag_ros.bags import Run, WindowSpan, open_runs
 from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.coastdown import events
-from shipdrag_ros.coastdown.events import ENDED_BY
 from shipdrag_ros.display import Table, dated, duration, speed_unit, utc
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.estimation import words as estimate_words
@@ -142,7 +141,7 @@ class Coastdown(ShownResistance):
         return lambda axis: draw_resistance(axis, estimate, self.ship, truth=shown)
 
     def _title(self) -> str:
-        ended = ENDED_BY[self.event.ended_by]
+        ended = self.event.why
         return f'{utc(self.start_ns)}, {self.duration_s:.0f} s, until {ended}'
 
     def _columns(self) -> Mapping[str, Any]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import ENDED_BY, EndedCoastdown, InputCounts, NotCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, InputCounts, NotCoastdown
 from shipdrag_ros.display import Table, spreadsheet_text
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
 from shipdrag_ros.estimation.reciprocal import Combined
@@ -62,7 +62,7 @@ def coastdowns_table(runs: Sequence[RunResult]) -> Table:
                     display.utc(coastdown.start_ns),
                     run.bag,
                     *(cell or '-' for cell in cells),
-                    coastdown.failure or ENDED_BY[coastdown.ended_by],
+                    coastdown.failure or coastdown.why,
                 )
             )
     heads = ('start', 'bag', 'at', 'resistance', 'effective power', 'clean hull', 'ended because')

@@ -74,10 +74,11 @@ def ended(coastdown: EndedCoastdown) -> str:
     """
     Say what ended a coastdown, and how likely that is, where the regimes alone tell.
     """
-    text, regimes = ENDED_BY[coastdown.ended_by], coastdown.regimes
+    text, regimes = coastdown.why, coastdown.regimes
     chances = {} if regimes is None else regimes.ends(coastdown.end_ns)
     chance = f'{chances.get(coastdown.ended_by, 0.0):.2f}'
-    return text if chance == '0.00' else f'{text} (P {chance})'
+    sure = chance == '0.00' or text != ENDED_BY[coastdown.ended_by]
+    return text if sure else f'{text} (P {chance})'
 
 
 def recorded_sentence(recorded: Recorded) -> str:

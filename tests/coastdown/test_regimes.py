@@ -44,7 +44,8 @@ from shipdrag_ros.coastdown.regimes.state import (
 )
 from shipdrag_ros.coastdown.regimes.state import LOG as LOG_SAYS
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
 from tests.coastdown.conftest import window_itself
 
@@ -405,3 +406,38 @@ def test_no_glide_is_told_twice(ship) -> None:
     setting = BankSetting.of(HullPrior.of(ship), BIN_S)
     told = read_out.glides(spans, setting, np.linspace(7.0, 3.0, 120))
     assert [(each.begin_s, each.end_s) for each in told] == [(20.0, 300.0)]
+
+
+def seconds_of(channel: Channel, value: np.ndarray) -> Block:
+    return Block.of(channel, START_NS + np.arange(len(value)) * S, value)
+
+
+def test_of_two_coastdowns_the_second_claims_nothing_of_the_first() -> None:
+    # a tanker that glides in gusts, and turns from 1200 s after the stop on
+    rng, gust, drag = np.random.default_rng(7), 0.0, 9.3e-5
+    speed = np.full(3300, 7.5)
+    for k in range(1, len(speed)):
+        gust += 0.05 * np.sqrt(0.05) * rng.normal() - gust / 40.0
+        force = drag * 56.25 * ((k < 900) + gust)
+        speed[k] = speed[k - 1] + force - (1.9 if k > 2100 else 1.0) * drag * speed[k - 1] ** 2
+    tanker = Ship(length_m=330.0, displaced_volume_m3=312000.0)
+    log = seconds_of(Channel.SPEED_THROUGH_WATER, speed + 0.05 * rng.normal(size=len(speed)))
+    first, second = of(EndedCoastdown, events_of(tanker, log))
+    assert second.cuts
+    assert second.stop_ns is not None
+    assert second.stop_ns >= first.end_ns
+    assert min(cut.start_ns for cut in second.cuts) >= first.end_ns
+
+
+def test_a_glide_in_which_she_keeps_her_speed_is_not_said_to_be_braked_or_driven() -> None:
+    rng, ferry = np.random.default_rng(0), Ship(length_m=90.0, displaced_volume_m3=3500.0)
+    time_s = np.arange(1900.0)
+    slowing_s = np.clip(time_s - 900.0, 0.0, 350.0) + np.maximum(time_s - 1500.0, 0.0)
+    speed = 7.5 / (1.0 + 6.9e-3 * slowing_s) + 0.05 * rng.normal(size=len(time_s))
+    revs = 10.5 * np.exp(-np.maximum(time_s - 900.0, 0.0) / 8.0) + 0.02 * rng.normal(size=1900)
+    log = seconds_of(Channel.SPEED_THROUGH_WATER, speed)
+    events = events_of(ferry, in_arrival_order([log, seconds_of(Channel.SHAFT, revs)]))
+    (ended,) = of(EndedCoastdown, events)
+    assert ended.ended_by is EndedBy.ENGINE
+    assert ended.why == 'the ship slowed no more, gliding with P 1.00'
+    assert [each.reason for each in of(NotCoastdown, events)] == [Dismissal.PLATEAU]

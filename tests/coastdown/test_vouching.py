@@ -32,7 +32,7 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.coastdown.vouching import Craft, Vouching, sound_probabilities
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel
+from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, Sensor, sense, simulate
 from tests.coastdown.conftest import bits
@@ -349,3 +349,34 @@ def test_noisy_positions_beside_a_quiet_speed_over_ground_are_no_contradiction(s
         Sensor(channel=Channel.POSITION_2, sd=10.0),
     )
     assert not watched(ship, block)[0].contradictions()
+
+
+@pytest.mark.parametrize(
+    ('glides', 'shaft'), [(False, False), (False, True), (True, True)], ids=['', 'shaft', 'glide']
+)
+def test_a_coastdown_that_rests_on_a_doubted_log_is_judged_without_it(glides, shaft) -> None:
+    # a log fades while she sails on; or fixes go on evenly while she glides, as the shaft says
+    rng, time_s = np.random.default_rng(4), np.arange(2900.0)
+    tanker = Ship(length_m=330.0, displaced_volume_m3=312000.0)
+    after_s = np.maximum(time_s - 900.0, 0.0)
+    stamp_ns = START_NS + np.arange(len(time_s)) * SECOND_NS
+    log = 7.5 / (1.0 + (1e-3 if glides else 2e-3) * after_s) + 0.05 * rng.normal(size=len(time_s))
+    track = np.column_stack([7.5 * time_s, 0.0 * time_s]) + rng.normal(0, 5.0, (len(time_s), 2))
+    revs = 10.5 * np.exp(-after_s / 8.0 * glides) + 0.02 * rng.normal(size=len(time_s))
+    readings = [(FIRST, log), (Channel.POSITION, track), (Channel.SHAFT, revs)]
+    block = in_arrival_order(
+        [Block.of(channel, stamp_ns, value) for channel, value in readings[: 2 + shaft]]
+    )
+    said = []
+    for size in (997, len(block)):
+        monitor, events = Monitor(tanker, Parameters(), estimate=None), list[Event]()
+        for first in range(0, len(block), size):
+            events += monitor.update(block[first : first + size])
+        said.append([*events, *monitor.finish()])
+    assert [bits(event) for event in said[0]] == [bits(event) for event in said[1]]
+    assert 'speed_through_water' in monitor.left_out()
+    ended = [event for event in said[0] if isinstance(event, EndedCoastdown)]
+    assert ended
+    assert any(event.stands for event in ended) is glides
+    if not glides:
+        assert 'By what is left, nothing slowed her after all' in str(ended[0].failure)

@@ -142,6 +142,7 @@ def test_a_shaft_that_goes_on_at_part_of_its_speed_is_said() -> None:
         found = RunDown.of(cut(series(Channel.SHAFT, TIME, shaft), speed), SHIP)
         assert 'the shaft shows' in found.notes[0]
         assert says in found.notes[-1]
+        assert 'begins after the shaft has stopped' not in found.notes[-1]  # as it never does
 
 
 def test_a_log_that_reads_nothing_at_the_end_says_nothing_of_the_shaft() -> None:

@@ -39,7 +39,8 @@ class SmoothedGlide(NamedTuple):
     begin_sd_s
         Standard deviation of `begin_s`.
     before, after
-        Regime that it follows, and that follows it; -1 where none does.
+        Regime that it follows, and that follows it; -1 where none does, a glide where she kept
+        her speed.
     """
 
     before_s: float
@@ -191,7 +192,7 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
             continue
         even_s = _even_s(speed, glide, step_s)
         if even_s < glide.end_s:
-            glide = glide._replace(end_s=even_s, after=s.LEVEL)
+            glide = glide._replace(end_s=even_s, after=s.GLIDE)
         if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.step_s / n.BIN_S:
             all_of.append(glide)
     return all_of
@@ -264,19 +265,21 @@ def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float
 
 def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSpeed | None:
     """
-    Return in what, no glide, she lost most of her speed from a bin to the slowest.
+    Return in what she lost most of her speed from a bin to the slowest.
 
-    None where she lost none.
+    A glide only where that is likelier throughout than all else. None where she lost none.
     """
     last = first + int(np.argmin(speed[first:])) + 1
     lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
     shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
-    codes = (s.LEVEL, s.AMID, s.BRAKE, s.TURN, s.GLIDE_TURN)
+    codes = (s.LEVEL, s.AMID, s.BRAKE, s.TURN, s.GLIDE_TURN, s.GLIDE)
     parts = [(found.what == code) & (shared > 0.0) for code in codes]
     losses = [
         probability_of(found.part(part), len(speed), step_s)[first:last] * lost for part in parts
     ]
-    best = int(np.argmax([loss.sum() for loss in losses]))
+    glided = probability_of(found.part(found.what == s.GLIDE), len(speed), step_s)[first:last]
+    most = int(np.argmax([loss.sum() for loss in losses[:-1]]))
+    best = len(codes) - 1 if glided.min() > _LIKELY else most
     if not losses[best].sum() > 0.0:
         return None
     share, part = (found.weight * shared)[parts[best]], found.part(parts[best])

@@ -55,6 +55,7 @@ _FIXES = 2.0  # in a bin: a way is from one to the next
 
 _ENDED = {
     s.LEVEL: EndedBy.ENGINE,
+    s.GLIDE: EndedBy.ENGINE,
     s.AMID: EndedBy.ENGINE,
     s.BRAKE: EndedBy.BRAKE,
     s.TURN: EndedBy.TURN,
@@ -66,6 +67,7 @@ _WHY = {
     s.BRAKE: (Dismissal.BRAKE, 'something but the water slowed her'),
     s.TURN: (Dismissal.TURN, 'she turned under power'),
     s.GLIDE_TURN: (Dismissal.TURN, 'she turned'),
+    s.GLIDE: (Dismissal.PLATEAU, 'she glided on, but slowed too little to show what slows her'),
 }
 _AGAIN = Dismissal.THRUST, 'she slowed less than water alone slows her, as if driven again'
 _REVERSED = Dismissal.ASTERN, 'a propeller was reversed'
@@ -130,10 +132,12 @@ class RegimeFilter:
         Of the monitor: which shafts are read.
     woken
         Second in which it is woken; the record before it is taken too.
+    lead_s
+        How much of it.
     """
 
-    def __init__(self, ship: Ship, bins: Bins, woken: int) -> None:
-        first = woken - LEAD_S
+    def __init__(self, ship: Ship, bins: Bins, woken: int, lead_s: int = LEAD_S) -> None:
+        first = woken - lead_s
         shafts = sum(int(bins.filling[each]) > first for each in SHAFTS)
         hull = HullPrior.of(ship)
         self._width = max(1, round(max(hull.bin_s, _of_fixes_s(bins, woken))))
@@ -175,12 +179,12 @@ class RegimeFilter:
         """
         Take it from a person that the engine was stopped [s since the epoch].
         """
-        self._setting = self._setting._replace(told_s=stop_s - self._zero_s)
+        self._setting = self._setting._replace(told_s=stop_s - self.begun_s)
 
     @property
     def told_s(self) -> float:
         """The stop that a person told [s since the epoch]; NaN where nobody did."""
-        return self._setting.told_s + self._zero_s
+        return self._setting.told_s + self.begun_s
 
     @property
     def told_ns(self) -> int | None:
@@ -198,7 +202,8 @@ class RegimeFilter:
         return self.taken_s > self._woken
 
     @property
-    def _zero_s(self) -> int:
+    def begun_s(self) -> int:
+        """Second since the epoch from which on motion was read."""
         return self._first * self._width
 
     @property
@@ -235,7 +240,7 @@ class RegimeFilter:
         each, last = np.arange(used), all_.row['count'][:used] - 1
         switched = all_.switched[each, last]
         glides = (last >= 0) & (switched['what'] == s.GLIDE)
-        before = self._zero_s + switched['at'] <= second
+        before = self.begun_s + switched['at'] <= second
         return float(np.exp(all_.row['weight'][:used])[glides & before].sum())
 
     def slow_since(self, speed_m_s: float) -> float | None:
@@ -256,26 +261,26 @@ class RegimeFilter:
         if faster > n.ANNOUNCE[1]:
             return None
         slow = np.cumsum(self._speed[::-1] >= speed_m_s) == 0
-        return float(self._zero_s + (len(slow) - int(slow.sum()) + 1) * self._width)
+        return float(self.begun_s + (len(slow) - int(slow.sum()) + 1) * self._width)
 
     def read_after(self, second: float) -> float:
         """
         Return the begin of the first bin after a second in which motion was read [s].
         """
-        since = max(math.ceil((second - self._zero_s) / self._width), 0)
+        since = max(math.ceil((second - self.begun_s) / self._width), 0)
         gap = np.cumsum(self._read[since:]) == 0
-        return float(self._zero_s + (since + int(gap.sum())) * self._width)
+        return float(self.begun_s + (since + int(gap.sum())) * self._width)
 
     def unread_about(self, second: float) -> tuple[float, float]:
         """
         Return begin and end of the time about a second in which no motion was read [s].
         """
-        at = min(max(int((second - self._zero_s) // self._width), 0), len(self._read) - 1)
+        at = min(max(int((second - self.begun_s) // self._width), 0), len(self._read) - 1)
         read = np.flatnonzero(self._read)
         before, after = np.split(read, [int(np.searchsorted(read, at))])
         first = int(before[-1]) + 1 if len(before) else 0
         last = int(after[0]) if len(after) else len(self._read)
-        return self._zero_s + first * self._width, self._zero_s + last * self._width
+        return self.begun_s + first * self._width, self.begun_s + last * self._width
 
     @property
     def even(self) -> bool:
@@ -298,11 +303,17 @@ class RegimeFilter:
         """Whether it should be asked for glides that were over before anybody noticed."""
         return len(self._out) % _ASKED_EVERY == 0
 
-    def glides(self) -> list[Dated]:
+    def glides(self, since_s: float) -> list[Dated]:
         """
         Return the coastdowns so far, in order.
+
+        None claims anything of the time before the end of the last, or before what was told.
         """
-        return [self._dated(each) for each in glides(self._spans, self._setting, self._speed)]
+        found = list[Dated]()
+        for each in glides(self._spans, self._setting, self._speed):
+            found.append(self._dated(each, since_s))
+            since_s = max(since_s, found[-1].end_s)
+        return found
 
     @property
     def _spans(self) -> Spans:
@@ -312,14 +323,17 @@ class RegimeFilter:
     def _speed(self) -> Float64:
         return np.array([out[SPEED] for out in self._out])
 
-    def _dated(self, glide: SmoothedGlide) -> Dated:
-        before, stop, start, begin, end = (self._zero_s + each for each in glide[:5])
+    def _dated(self, glide: SmoothedGlide, since_s: float) -> Dated:
+        *past, begin, end = (self.begun_s + each for each in glide[:5])
+        ran_down = not self._setting.shafts and begin - past[1] > _RAN_DOWN_S
+        before, stop, start = (min(max(each, since_s), begin) for each in past)
         cuts: list[NotCoastdown] = []
         if glide.before in (s.BRAKE, s.GLIDE_TURN):  # nothing drove her before it
             cuts.append(_cut(before, stop, *_WHY[glide.before]))
-        if not self._setting.shafts and begin - stop > _RAN_DOWN_S:
+        if ran_down:
+            how = 'ran down' if stop == past[1] else 'may have been left'
             text = (
-                f'the thrust ran down for {begin - stop:.0f} s, and was gone at the end of that, '
+                f'the thrust {how} for {begin - stop:.0f} s, and was gone at the end of that, '
                 f'± {glide.begin_sd_s:.0f} s'
             )
             cuts.append(_cut(stop, begin, Dismissal.THRUST, text))
@@ -349,7 +363,7 @@ class RegimeFilter:
         """
         if not self._out:
             return None
-        since = math.ceil(max((since_s - self._zero_s) / self._width, 0.0))
+        since = math.ceil(max((since_s - self.begun_s) / self._width, 0.0))
         table = np.array(self._out)
         doubted = since + np.flatnonzero(table[since:, P_EVEN] < _DOUBTED)
         if not len(doubted) or table[doubted, SPEED].argmin() == 0:
@@ -366,7 +380,7 @@ class RegimeFilter:
             reason, text = _UNSEEN
         most = float((table[first:last, P_RUN_DOWN] + table[first:last, P_GLIDING]).max())
         start_ns, end_ns = (
-            round((self._zero_s + k * self._width) * SECOND_NS) for k in (first, last)
+            round((self.begun_s + k * self._width) * SECOND_NS) for k in (first, last)
         )
         said = f'{text}: P(gliding) was {most:.2f} at most'
         return NotCoastdown(start_ns, end_ns, reason, said)
@@ -375,7 +389,7 @@ class RegimeFilter:
         """
         Return the stretches without thrust in which more than one glide is likely [s].
         """
-        zero = self._zero_s
+        zero = self.begun_s
         found = unpowered(self._spans, len(self._out), self._setting)
         return [(zero + first_s, zero + last_s) for first_s, last_s in found]
 
@@ -385,7 +399,7 @@ class RegimeFilter:
         """
         if not self._out:
             return None
-        middle_s = self._zero_s + (np.arange(len(self._out)) + 0.5) * self._width
+        middle_s = self.begun_s + (np.arange(len(self._out)) + 0.5) * self._width
         probability = smoothed(self._spans, len(self._out), self._setting.step_s)
         time_ns = np.round(middle_s * SECOND_NS).astype(np.int64)
         excess = sum(float(out[FIT]) for out in self._out) / max(sum(self._read), 1)

@@ -105,8 +105,8 @@ class InitialGuess:
         slope = float((weight * t * (inverse - mean)).sum() / (weight * t * t).sum())
         if not slope * float(np.ptp(coast.time_s)) > _LEAST_LOSS * mean:
             raise EstimationError(
-                f'no deceleration in {np.ptp(coast.time_s):.4g} s: give a longer window, or one '
-                'after the engine stop'
+                f'no deceleration in {np.ptp(coast.time_s):.4g} s: if she slowed at another time, '
+                'give a window there'
             )
         first = mean - slope * mean_t
         v0 = min(1.0 / first, _ABOVE * top) if first > 0.0 else _ABOVE * top
