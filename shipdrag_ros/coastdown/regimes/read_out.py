@@ -238,7 +238,7 @@ def _even_s(speed: Float64, glide: SmoothedGlide, step_s: float) -> float:
     part, length = n.EVEN
     ahead = round(float(length) / n.BIN_S)
     first = round(glide.begin_s / step_s) + 2 * ahead
-    last = min(round(glide.end_s / step_s), len(speed) - ahead)
+    last = min(round(glide.end_s / step_s), len(speed)) - ahead  # what she does later is no glide
     for k in range(first, last):
         now = float(np.mean(speed[max(k - 3, 0) : k + 1]))
         if float(np.mean(speed[k + ahead - 3 : k + ahead + 1])) > part * now:
