@@ -105,3 +105,19 @@ def test_a_shaft_that_reads_anything_hides_no_coastdown(quiet, record, sensors, 
     (onset,) = [each for each in events if isinstance(each, Onset)]
     assert abs(onset.start_ns - START_NS - STOP_S * 1e9) < 20e9
     assert SAID['zero'] in quiet.contradictions()['shaft']
+
+
+def test_a_shaft_that_the_friction_of_its_engine_stops_is_no_liar(quiet, record, sensors) -> None:
+    block = record(sensors=(sensors['log'], sensors['shaft']), lead_in_s=1200.0, duration_s=900.0)
+    log = block[block.channel == Channel.SPEED_THROUGH_WATER]
+    smooth = np.convolve(log.value[:, 0], np.full(31, 1.0 / 31.0), 'same')
+    part = np.interp(block.stamp_ns, log.stamp_ns, smooth) / smooth[1000]
+    shaft = block.channel == Channel.SHAFT
+    free = 0.62 * np.sqrt((part**2 - 0.55**2).clip(0.0))  # it stands below 0.55 of the speed
+    left = np.exp(-((block.stamp_ns - START_NS) / 1e9 - 1200.0).clip(0.0) / 8.0)
+    turns = block.value[shaft, 0][900] * np.maximum(free, left)
+    value = np.where(shaft & (left < 1.0), turns, block.value[:, 0])
+    block = replace(block, value=np.column_stack([value, block.value[:, 1]]))
+    fed(quiet, block, 2080.0)
+    assert quiet.state is State.COASTDOWN
+    assert 'shaft' not in quiet.doubts()

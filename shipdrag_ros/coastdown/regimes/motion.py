@@ -445,7 +445,10 @@ def _dragged(
     revs = f.revs
     if kind == s.WINDMILLS:
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
-            return _as_usual(f, nu, u_part, 0.05, 0.3 if scaled else 0.05)
+            turns = _as_usual(f, nu, u_part, 0.05, 0.45 if scaled else 0.05)
+            stops = n.STOPS_TURNING * _normal(nu, 2.0 * n.SHAFT_SD[0])  # or be held by it
+            f.revs += stops / (stops + turns + n.SHAFT_LIES) * (nu / u_part - f.revs)
+            return turns + stops
         if not scaled:
             f.revs = nu / u_part
             return 1.0 / u_part if nu < u_part + n.SHAFT_SD[0] else 0.0

@@ -177,7 +177,7 @@ FADES = _grid('FADES', (0.1, 0.4), 'of u_e in 10 min', 'power that is taken off 
 FADES_SHARE = _number('FADES_SHARE', 0.15, '1', 'of switches to another level: evenly to less')
 FADES_DRIFT = _number('FADES_DRIFT', 0.3, 'ln in 10 min', 'sd of the rate')
 FADES_SD = _number('FADES_SD', 0.6, 'ln', 'of each')
-ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
+ENGAGE_S = _grid('ENGAGE_S', (10.0, 1.0), 's', 'from no thrust to a level: usual, clutched in')
 BRAKES = _grid('BRAKES', (0.4, 1.0, 2.5), 'of the first resistance', 'astern power, tugs')
 BRAKES_SD = _number('BRAKES_SD', 0.47, 'ln', 'a factor of 1.6 either way')
 STOPPERS = _grid('STOPPERS', (8.0, 30.0), 'of the first resistance', 'lines, wheels, a quay')
@@ -204,6 +204,7 @@ SHAFT_TEMPER = _number('SHAFT_TEMPER', 0.35, '1', 'of its log likelihood: errors
 SHAFT_SD = _grid('SHAFT_SD', (0.015, 0.04), '1', 'its own error, and that of an expectation')
 SHAFT_FIRST_SD = _number('SHAFT_FIRST_SD', 0.12, '1', 'of what a level should have')
 WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.85), '1', 'over u / U: mean, sd, most; 108 glides')
+STOPS_TURNING = _number('STOPS_TURNING', 0.01, '1', 'of bins: friction holds a screw that windmilled')
 CREEPS = _number('CREEPS', 0.1, '1', 'revs that give a hundredth of the thrust')
 SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 

@@ -190,9 +190,10 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
         # one that was not over at a doubt goes on after it
         if all_of and min(glide.begin_s, first * step_s) < all_of[-1].end_s:
             continue
-        even_s = _even_s(speed, glide, step_s)
-        if even_s < glide.end_s:
-            glide = glide._replace(end_s=even_s, after=s.GLIDE)
+        begin, end = (round(each / step_s) for each in (glide.begin_s, glide.end_s))
+        even = even_from(speed, begin, end)
+        if even is not None:
+            glide = glide._replace(end_s=even * step_s, after=s.GLIDE)
         if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.step_s / n.BIN_S:
             all_of.append(glide)
     return all_of
@@ -234,17 +235,17 @@ def median(value: Float64, share: Float64) -> float:
     return float(value[order[min(int(place), len(order) - 1)]])
 
 
-def _even_s(speed: Float64, glide: SmoothedGlide, step_s: float) -> float:
-    """Return when she begins to keep her speed; infinite where she does not."""
+def even_from(speed: Float64, begin: int, end: int) -> int | None:
+    """
+    Return the bin from which she keeps her speed, between two bins; None where she does not.
+    """
     part, length = n.EVEN
     ahead = round(float(length) / n.BIN_S)
-    first = round(glide.begin_s / step_s) + 2 * ahead
-    last = min(round(glide.end_s / step_s), len(speed) - ahead)
-    for k in range(first, last):
+    for k in range(begin + 2 * ahead, min(end, len(speed)) - ahead):  # what comes later is no glide
         now = float(np.mean(speed[max(k - 3, 0) : k + 1]))
         if float(np.mean(speed[k + ahead - 3 : k + ahead + 1])) > part * now:
-            return k * step_s
-    return float('inf')
+            return k
+    return None
 
 
 def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float, float]]:
