@@ -151,6 +151,13 @@ def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives(pitc
     assert 'the shaft turns' in found.failure
 
 
+@pytest.mark.parametrize('level', [0.5, 0.8])
+def test_a_level_that_only_the_claim_makes_a_glide_is_told(level: float) -> None:
+    found = judged(block(LOG, noisy(slowed(np.full(len(TIME_S), level)))))
+    assert any(note.startswith('she keeps her speed from ') for note in found.notes)
+    assert judged(block(LOG, noisy(glide(TIME_S)))).notes == ()
+
+
 def test_power_taken_back_in_steps_is_no_coastdown() -> None:
     time_s = np.arange(-200.0, LENGTH_S)
     revs = np.select([time_s < 0.0, time_s < 150.0], [1.0, 0.75], 0.5)

@@ -241,7 +241,9 @@ def even_from(speed: Float64, begin: int, end: int) -> int | None:
     """
     part, length = n.EVEN
     ahead = round(float(length) / n.BIN_S)
-    for k in range(begin + 2 * ahead, min(end, len(speed)) - ahead):  # what comes later is no glide
+    for k in range(
+        begin + 2 * ahead, min(end, len(speed)) - ahead
+    ):  # what comes later is no glide
         now = float(np.mean(speed[max(k - 3, 0) : k + 1]))
         if float(np.mean(speed[k + ahead - 3 : k + ahead + 1])) > part * now:
             return k
