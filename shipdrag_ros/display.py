@@ -222,16 +222,16 @@ def way(metres: float, mass_kg: float, largest_m: float = 0.0) -> str:
     return f'{metres / MILE_M:.2f} nm'
 
 
-def plus_minus(value: float, spread: float) -> str:
+def plus_minus(value: float, spread: float, sign: str = '') -> str:
     """
-    Return a value and its spread, both to the digits that the spread allows.
+    Return a value and its spread, both to the digits that the spread allows; '+' shows each sign.
     """
     if not (math.isfinite(value) and math.isfinite(spread) and spread > 0.0):
-        return f'{value:.4g} ± {spread:.2g}'
+        return f'{value:{sign}.4g} ± {spread:.2g}'
     decimals = decimals_of(spread)
     if decimals < 0:
         value, spread, decimals = round(value, decimals), round(spread, decimals), 0
-    return f'{value:.{decimals}f} ± {spread:.{decimals}f}'
+    return f'{value:{sign}.{decimals}f} ± {spread:.{decimals}f}'
 
 
 def decimals_of(spread: float) -> int:

@@ -421,7 +421,7 @@ def read(
     from shipdrag_ros.library.logs import is_frame
 
     given = ship_of(ship)
-    alone = isinstance(source, str | PathLike) or is_frame(source)
+    alone = isinstance(source, str | PathLike | Mapping) or is_frame(source)
     several = source if not alone and isinstance(source, Iterable) else [source]
     bags: list[Path] = []
     others: list[Any] = []
@@ -570,7 +570,8 @@ class Resistance(ShownResistance):
     def _lines(self) -> Sequence[str]:
         lines = []
         for run in self.runs:
-            lines += [*run.summary(), *(f'Warning: {warning}' for warning in run.warnings)]
+            said = (line.replace(', see below', '') for line in run.summary())  # nothing follows
+            lines += [*said, *(f'Warning: {warning}' for warning in run.warnings)]
         whole = together(self.runs)
         if whole.why_not:
             lines.append(f'Not combined: {whole.why_not}.')

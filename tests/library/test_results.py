@@ -170,6 +170,8 @@ def test_where_there_is_no_coastdown_it_says_why() -> None:
     assert found.coastdowns == ()
     assert repr(found) == '<Resistance: Vitus Bering, no coastdowns>'
     assert found.summary().startswith('No coastdown found')
+    slow = sd.simulate(sd.Ship.example(), duration_s=25.0, lead_in_s=400.0)
+    assert 'one stretch was looked at and dismissed.' in sd.estimate(slow).summary()
     for ask in (lambda: found.curve, found.plot, found.to_frame):
         with pytest.raises(sd.ShipdragError, match='No coastdown found'):
             ask()
