@@ -358,19 +358,21 @@ def json_text(document: object, *, indent: int | None = 2) -> str:
     try:
         text = json.dumps(document, indent=indent, separators=separators, allow_nan=False)
     except (TypeError, ValueError):
-        plain = _plain(document)
+        plain = plain_json(document)
         text = json.dumps(plain, indent=indent, separators=separators, allow_nan=False)
     return f'{text}\n' if indent else text
 
 
-def _plain(value: Any) -> Any:
-    """Turn arrays into lists, and what is not finite into None."""
+def plain_json(value: Any) -> Any:
+    """
+    Turn arrays into lists, and what is not finite into None.
+    """
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain_json(value.tolist())
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain_json(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

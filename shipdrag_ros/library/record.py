@@ -30,7 +30,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.playback import StopTime
 from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve, together
-from shipdrag_ros.replay.tables import document
+from shipdrag_ros.replay.tables import coastdown_document, document
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
 from shipdrag_ros.ship import SHIP_FILE, Ship
 
@@ -120,6 +120,9 @@ class Coastdown(ShownResistance):
                 f'{self.event.failure or "no reason given"}'
             )
         return self.event.estimate.valid_curve
+
+    def _document(self) -> Mapping[str, Any]:
+        return coastdown_document(self.bag, self.event)
 
     def _lines(self) -> Sequence[str]:
         return words.summary(self.event, self.ship)
@@ -261,6 +264,9 @@ class Record(Shown):
         ship = self.given if SHIP_FILE in self.runs[0].attachments else self.ship
         self.runs[0].save(out, {} if ship is None else {SHIP_FILE: ship.to_yaml()})
         return out
+
+    def _document(self) -> Mapping[str, Any]:
+        return {'bags': [run.about() for run in self.runs]}
 
     def _lines(self) -> Sequence[str]:
         ship = self.ship
@@ -524,10 +530,7 @@ class Resistance(ShownResistance):
             )
         raise EstimationError(' '.join(self.summary().splitlines()))
 
-    def to_dict(self) -> dict[str, Any]:
-        """
-        Return the JSON document of `shipdrag replay`; arrays are numpy's.
-        """
+    def _document(self) -> Mapping[str, Any]:
         return document(self.runs)
 
     def forecast(self, after: float | Sequence[float] = forecasts.AFTER_S) -> forecasts.Forecasts:
