@@ -66,16 +66,6 @@ DEVELOPMENT = [
     'colcon-python-setup-py',
     'setuptools',
 ]
-FORMATS = {  # of logs: name and module
-    'ardupilot': 'ardupilot',
-    'csv': 'csv.importer',
-    'gpx': 'gpx',
-    'n2k': 'n2k',
-    'nmea': 'nmea',
-    'rosbag': 'rosbag',
-    'signalk': 'signalk',
-    'ulog': 'ulog',
-}
 
 setup(
     name=PACKAGE,
@@ -131,13 +121,6 @@ setup(
         'console_scripts': [
             f'shipdrag = {PACKAGE}.cli:main',
             f'coastdown_node = {PACKAGE}.node.main:main',
-        ],
-        'shipdrag.papers': [
-            f'{name} = {PACKAGE}.studies.{name}:STUDY'
-            for name in ('cable', 'sensitivity', 'residual', 'surface')
-        ],
-        'shipdrag.formats': [
-            f'{name} = {PACKAGE}.sources.formats.{place}:FORMAT' for name, place in FORMATS.items()
         ],
     },
 )

@@ -27,6 +27,7 @@ import tokenize
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from benchmarks import ROOT
@@ -178,6 +179,51 @@ def count(tree: Path) -> Count:
     return found
 
 
+def dotted(path: Path, tree: Path) -> str:
+    """
+    Return the name by which a source file is imported.
+    """
+    return '.'.join(path.relative_to(tree).with_suffix('').parts).removesuffix('.__init__')
+
+
+@cache
+def imports(path: Path) -> tuple[str, ...]:
+    """
+    Return the dotted names that a source file imports, wherever in it.
+    """
+    found: list[str] = []
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Import):
+            found += (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f'{path}: relative import'
+            found += (f'{node.module}.{alias.name}' for alias in node.names)
+    return tuple(found)
+
+
+def circles(tree: Path) -> set[frozenset[str]]:
+    """
+    Return the modules of each room of a tree that import each other in a circle.
+    """
+    files = {dotted(path, tree): path for path in (tree / PACKAGE).glob('*/**/*.py')}
+    below = {}
+    for name, path in files.items():
+        named = (each if each in files else each.rpartition('.')[0] for each in imports(path))
+        room = name.split('.')[1]
+        below[name] = {each for each in named if each in files and each.split('.')[1] == room} - {
+            name
+        }
+    for by in files:  # Warshall: what is reached by way of each
+        for name in files:
+            if by in below[name]:
+                below[name] = below[name] | below[by]
+    return {
+        frozenset(each for each in below[name] if name in below[each])
+        for name in files
+        if name in below[name]
+    }
+
+
 def walk(
     tree: Path, line: list[str], module: str, function: str
 ) -> tuple[list[list[str]], list[str]]:
@@ -233,6 +279,7 @@ def figures(tree: Path, folder: Path) -> dict[str, tuple[int, int | None]]:
         'modules that run in a diagnosis': (len(modules), 45),
         f'functions over {LINES} lines of code': (len(held.long), 0),
         f'functions over {PARAMETERS} parameters': (len(held.wide), 0),
+        'import circles': (len(circles(tree)), 0),
         'lines of code, tests': (lines(tree / 'tests'), 25_000),
         'lines of code, benchmarks': (lines(tree / 'benchmarks'), 10_000),
         'words, README and docs': (words(tree), 25_000),

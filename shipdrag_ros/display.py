@@ -222,16 +222,16 @@ def way(metres: float, mass_kg: float, largest_m: float = 0.0) -> str:
     return f'{metres / MILE_M:.2f} nm'
 
 
-def plus_minus(value: float, spread: float) -> str:
+def plus_minus(value: float, spread: float, sign: str = '') -> str:
     """
-    Return a value and its spread, both to the digits that the spread allows.
+    Return a value and its spread, both to the digits that the spread allows; '+' shows each sign.
     """
     if not (math.isfinite(value) and math.isfinite(spread) and spread > 0.0):
-        return f'{value:.4g} ± {spread:.2g}'
+        return f'{value:{sign}.4g} ± {spread:.2g}'
     decimals = decimals_of(spread)
     if decimals < 0:
         value, spread, decimals = round(value, decimals), round(spread, decimals), 0
-    return f'{value:.{decimals}f} ± {spread:.{decimals}f}'
+    return f'{value:{sign}.{decimals}f} ± {spread:.{decimals}f}'
 
 
 def decimals_of(spread: float) -> int:
@@ -358,19 +358,21 @@ def json_text(document: object, *, indent: int | None = 2) -> str:
     try:
         text = json.dumps(document, indent=indent, separators=separators, allow_nan=False)
     except (TypeError, ValueError):
-        plain = _plain(document)
+        plain = plain_json(document)
         text = json.dumps(plain, indent=indent, separators=separators, allow_nan=False)
     return f'{text}\n' if indent else text
 
 
-def _plain(value: Any) -> Any:
-    """Turn arrays into lists, and what is not finite into None."""
+def plain_json(value: Any) -> Any:
+    """
+    Turn arrays into lists, and what is not finite into None.
+    """
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain_json(value.tolist())
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain_json(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

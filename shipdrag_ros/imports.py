@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import gc
+import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TypeVar
 
 _T = TypeVar('_T')
@@ -30,6 +32,9 @@ EXTRA_OF = {
     'rclpy': 'ros',
 }
 """Module -> the extra of this package that installs it."""
+LEFT_OUT: dict[EntryPoint, str] = {}
+"""What other packages declare and was left out, and why."""
+_PACKAGE = Path(__file__).parent
 _OF_ROS = ('_msgs', '_srvs', '_interfaces')
 
 
@@ -87,34 +92,64 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def of_other_packages(
-    group: str, accept: Callable[[object], _T], *, own: str
-) -> Iterator[tuple[EntryPoint, _T]]:
+def points(group: str, attribute: str, *places: str) -> tuple[EntryPoint, ...]:
     """
-    Yield what packages that are installed beside this one declare as entry points, by name.
+    Return the entry points of a group: this package's own first, then those of others.
 
-    One that cannot be loaded or accepted is left out with a warning.
+    Its own are made of its modules in some places, so that a tree need not be installed.
 
     Parameters
     ----------
     group
         Of the entry points.
-    accept
-        Returns what was loaded, or raises what is wrong with it.
-    own
-        Package whose entry points are known without an installation.
+    attribute
+        That each module of this package declares.
+    places
+        Patterns of paths in this package.
     """
-    for entry in sorted(entry_points(group=group)):
-        if entry.module.startswith(f'{own}.'):
-            continue
+    own = []
+    for file in (file for place in places for file in sorted(_PACKAGE.glob(place))):
+        path = Path(os.path.normpath(file)).relative_to(_PACKAGE.parent).with_suffix('')
+        own.append(EntryPoint(path.name, f'{".".join(path.parts)}:{attribute}', group))
+    known = {point.value for point in own}
+    others = (point for point in entry_points(group=group) if point.value not in known)
+    return (*own, *sorted(others))
+
+
+def load(
+    points: Iterable[EntryPoint], kind: type[_T], key: str = 'name', taken: Collection[str] = ()
+) -> dict[str, tuple[EntryPoint, _T]]:
+    """
+    Return what entry points declare, by its name.
+
+    What cannot be loaded of another package, is of another kind or has a name that is taken, is
+    left out with a warning; `LEFT_OUT` keeps why.
+
+    Parameters
+    ----------
+    points
+    kind
+        Of what they declare.
+    key
+        Its attribute that is the name.
+    taken
+        Names that none may have.
+    """
+    found: dict[str, tuple[EntryPoint, _T]] = {}
+    for point in points:
         try:
-            found = accept(entry.load())
+            declared = point.load()
+            if not isinstance(declared, kind) or getattr(declared, key) in {*taken, *found}:
+                what = f'{declared!r:.80}, expected {kind.__name__} with a name that is not taken'
+                raise TypeError(what)
         except Exception as error:  # whatever the code of a stranger does
-            warnings.warn(
-                f'{entry.name!r} ({entry.value}) of {group} is left out: {error}; mend or '
-                'uninstall its package',
-                RuntimeWarning,
-                stacklevel=2,
-            )
-            continue
-        yield entry, found
+            if point.dist is None:
+                raise
+            why = f'{point.name!r} ({point.value}) of {point.group} is left out: {error}'
+            if point not in LEFT_OUT:
+                do = f'mend or uninstall the package {point.dist.name!r}'
+                warnings.warn(f'{why}; {do}', RuntimeWarning, stacklevel=2)
+            LEFT_OUT[point] = why
+        else:
+            found[getattr(declared, key)] = (point, declared)
+    return found

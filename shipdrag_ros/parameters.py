@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from importlib.metadata import EntryPoint, entry_points
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from shipdrag_ros import strict_yaml
@@ -29,6 +27,7 @@ from shipdrag_ros.fields import (
     text_of,
     whole_number,
 )
+from shipdrag_ros.imports import points
 
 _SECTION = 'ros__parameters'
 FORMER_ESTIMATORS = dict.fromkeys(('auto', 'log_time', 'ode_fit', 'warped', 'motion'), 'one')
@@ -43,20 +42,10 @@ FORMER_KEYS = {
 ESTIMATOR_GROUP = 'shipdrag.estimators'
 # each of these is one, also without an installation; listed without being imported
 _MODULES = ('estimation/estimators/[!_]*.py', 'studies/*/estimators/[!_]*.py')
-_PACKAGE = Path(__file__).parent
-
-
-def _estimators() -> dict[str, EntryPoint]:
-    own = {}
-    for file in sorted(found for place in _MODULES for found in _PACKAGE.glob(place)):
-        module = '.'.join(file.relative_to(_PACKAGE.parent).with_suffix('').parts)
-        own[file.stem] = EntryPoint(file.stem, f'{module}:ESTIMATOR', ESTIMATOR_GROUP)
-    others = sorted(entry_points(group=ESTIMATOR_GROUP), key=lambda point: point.name)
-    return own | {point.name: point for point in others if point.name not in own}
-
-
-ESTIMATOR_POINTS = _estimators()
-ESTIMATORS = tuple(ESTIMATOR_POINTS)
+ESTIMATOR_POINTS = {
+    point.name: point for point in reversed(points(ESTIMATOR_GROUP, 'ESTIMATOR', *_MODULES))
+}
+ESTIMATORS = tuple(sorted(ESTIMATOR_POINTS))
 """Values of the parameter `estimator`."""
 SPEEDS_M_S = (2.0, 1.0)
 

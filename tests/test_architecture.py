@@ -7,12 +7,13 @@ import ast
 import inspect
 import re
 from collections.abc import Iterator
-from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from benchmarks.house import circles, dotted, imports
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / 'shipdrag_ros'
@@ -91,27 +92,9 @@ def room(name: str) -> str:
     return parts[0] if parts else ''
 
 
-def dotted(path: Path) -> str:
-    """Return the name by which a source file is imported."""
-    return '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__')
-
-
-@cache
-def imports(path: Path) -> tuple[str, ...]:
-    """Return the dotted names that a source file imports, wherever in it."""
-    found: list[str] = []
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            found += (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f'{path}: relative import'
-            found += (f'{node.module}.{alias.name}' for alias in node.names)
-    return tuple(found)
-
-
 def wrong(path: Path) -> Iterator[str]:
     """Yield the imports of a source file that the picture does not allow."""
-    here = room(dotted(path))
+    here = room(dotted(path, ROOT))
     for name in imports(path):
         top, other = name.split('.')[0], room(name)
         if here not in ONLY_IN.get(top, {here}):
@@ -128,7 +111,7 @@ def test_imports_run_downward_and_stay_at_the_edges() -> None:
 
 
 def test_every_room_has_a_floor() -> None:
-    rooms = {room(dotted(path)) for path in SOURCES} - {''}
+    rooms = {room(dotted(path, ROOT)) for path in SOURCES} - {''}
     assert rooms <= set(FLOORS), f'give {rooms - set(FLOORS)} a floor'
 
 
@@ -139,36 +122,11 @@ def test_the_picture_shows_every_room() -> None:
     assert {room for room in wanted if not {f'{room}/', f'{room}.py'} & names} == set()
 
 
-def in_circles() -> set[str]:
-    """Return the modules that import themselves, by way of others of their room."""
-    modules = {dotted(path): path for path in SOURCES if room(dotted(path))}
-    below: dict[str, set[str]] = {}
-    direct = {
-        name: {
-            found
-            for each in imports(path)
-            if (found := each if each in modules else each.rpartition('.')[0]) in modules
-            and room(found) == room(name)
-        }
-        - {name}
-        for name, path in modules.items()
-    }
-    for name in modules:
-        left = set(direct[name])
-        reached: set[str] = set()
-        while left:
-            each = left.pop()
-            reached.add(each)
-            left |= direct[each] - reached
-        below[name] = reached
-    return {name for name in modules if name in below[name]}
-
-
 IN_CIRCLES = {'diagnosis', 'estimation', 'replay'}  # the list only shrinks
 
 
 def test_no_room_imports_itself_in_a_circle() -> None:
-    assert {room(name) for name in in_circles()} == IN_CIRCLES
+    assert {room(name) for circle in circles(ROOT) for name in circle} == IN_CIRCLES
 
 
 def named(path: Path) -> Iterator[str]:
@@ -221,9 +179,9 @@ def doors() -> list[tuple[str, str]]:
 
 def test_every_room_has_a_door() -> None:
     listed = {here.partition('.')[0] for here, _ in doors()}
-    assert listed == {dotted(path).split('.')[1] for path in SOURCES if path.parent != PACKAGE} | {
-        path.stem for path in PACKAGE.glob('*.py') if path.stem not in {'__init__', *GROUND}
-    }
+    assert listed == {
+        dotted(path, ROOT).split('.')[1] for path in SOURCES if path.parent != PACKAGE
+    } | {path.stem for path in PACKAGE.glob('*.py') if path.stem not in {'__init__', *GROUND}}
 
 
 @pytest.mark.parametrize(('here', 'door'), doors())

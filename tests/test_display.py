@@ -21,6 +21,7 @@ from shipdrag_ros import display
 )
 def test_a_spread_sets_the_digits(value: float, spread: float, text: str) -> None:
     assert display.plus_minus(value, spread) == text
+    assert display.plus_minus(value, spread, '+') == f'{"" if value < 0.0 else "+"}{text}'
 
 
 def test_times_of_a_real_clock_are_dates_and_others_are_seconds() -> None:

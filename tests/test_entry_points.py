@@ -1,48 +1,83 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An effect and an estimator of a stranger's package are found; broken ones break nothing."""
+"""What a stranger's package declares is used as the library's own; broken ones break nothing."""
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-PACKAGE = """
+EXAMPLE = Path(__file__).resolve().parents[1] / 'docs' / 'example_effect'
+PIP = (
+    *('-m', 'pip', 'install', '--quiet', '--disable-pip-version-check', '--no-index', '--no-deps'),
+    '--no-build-isolation',
+)
+USE = """
+from pathlib import Path
+import shipdrag_ros as sd
+ship = sd.Ship.example()
+record = sd.simulate(ship, ['fishing_net=6e4'], duration_s=600.0, lead_in_s=400.0)
+found = sd.diagnose(record)
+Path('ship.yaml').write_text(found.ship_with_effects().to_yaml())
+(written,) = sd.Ship.load('ship.yaml').effects
+print(found.verdict, *(each.name for each in found.effects), written.name)
+print(*(f'{each.value:.0f} {each.sd:.0f}' for each in written.parameters.values()))
+"""
+
+
+def run(folder: Path, *line: str) -> subprocess.CompletedProcess[str]:
+    """Run Python where what was installed into a folder is found."""
+    paths = os.pathsep.join([str(folder), os.environ.get('PYTHONPATH', '')])
+    return subprocess.run(
+        [sys.executable, *line],
+        cwd=folder,
+        env={**os.environ, 'PYTHONPATH': paths},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+
+def test_an_effect_of_an_installed_package_is_simulated_named_and_written(tmp_path: Path) -> None:
+    source, target = tmp_path / 'source', tmp_path / 'target'
+    shutil.copytree(EXAMPLE, source)
+    run(tmp_path, *PIP, '--target', str(target), str(source))
+    named, sized = run(target, '-c', USE).stdout.splitlines()
+    assert named == 'named fishing_net fishing_net'
+    value, sd = map(float, sized.split())
+    assert abs(value - 6e4) < 3.0 * sd < 9e3
+
+
+STRANGER = """
 from dataclasses import replace
 from shipdrag_ros.studies.s1.estimators.s1_speed import ESTIMATOR as PUBLISHED
-from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.simulation.effect import Action
-from shipdrag_ros.simulation.effect import Effect, Scope
-
-def act(frame, force):
-    return Action(wave_force_n=frame.earth(-force, 0.0))
-
-BARGE = Effect(
-    name='barge',
-    scope=Scope.HULL,
-    parameters=(Parameter(name="force_n", low=0.0, high=1e6, meaning='of the barge'),),
-    formula='a constant force',
-    source='mine',
-    act=act,
-)
 ESTIMATOR = replace(PUBLISHED, name='mine', meaning='an estimator of mine')
 """
 POINTS = """
+[shipdrag.formats]
+bad = no_module:FORMAT
+none = stranger:ESTIMATOR
 [shipdrag.effects]
-barge = stranger:BARGE
 broken = no_module:EFFECT
+[shipdrag.papers]
+paper = no_module:STUDY
 [shipdrag.estimators]
 mine = stranger:ESTIMATOR
 lost = stranger:NOTHING
 """
-USE = """
+LOOK = """
+from shipdrag_ros.cli import main
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.simulation.effects import parse
+assert main(['import', 'log.csv', '-o', 'log.mcap', '--json', 'log.json']) == 0
+assert main(['import', 'log.csv', '-o', 'again.mcap', '--json', 'log.json']) == 0
+assert main(['doctor', '--json', 'doctor.json']) == 0
 chosen = Parameters.from_mapping({'estimator': 'mine'}, subject='')
-print(parse('barge=2').name, named(chosen.estimator).meaning)
+print(named(chosen.estimator).meaning)
 try:
     named('lost')
 except EstimationError as error:
@@ -50,20 +85,28 @@ except EstimationError as error:
 """
 
 
-def test_those_of_another_package_are_found_and_broken_ones_are_named(tmp_path: Path) -> None:
+def test_what_cannot_be_imported_is_left_out_and_named_by_doctor(tmp_path: Path) -> None:
     about = tmp_path / 'stranger-1.0.dist-info'
     about.mkdir()
     (about / 'METADATA').write_text('Metadata-Version: 2.1\nName: stranger\nVersion: 1.0\n')
     (about / 'entry_points.txt').write_text(POINTS)
-    (tmp_path / 'stranger.py').write_text(PACKAGE)
-    paths = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
-    done = subprocess.run(
-        [sys.executable, '-c', USE],
-        env={**os.environ, 'PYTHONPATH': paths},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.startswith('barge an estimator of mine\n')
-    assert "the estimator 'lost' cannot be loaded: AttributeError" in done.stdout
-    assert "'broken' (no_module:EFFECT) of shipdrag.effects is left out: No module" in done.stderr
+    (tmp_path / 'stranger.py').write_text(STRANGER)
+    (tmp_path / 'log.csv').write_text('time,speed_through_water\n0,8\n1,7.9\n')
+    done = run(tmp_path, '-c', LOOK)
+    *_, mine, lost = done.stdout.splitlines()
+    assert mine == 'an estimator of mine'
+    why = "'lost' (stranger:NOTHING) of shipdrag.estimators is left out: module 'stranger' has no"
+    assert lost.startswith(f"the estimator 'lost' cannot be used: {why}")
+    found = json.loads((tmp_path / 'doctor.json').read_text())['findings']
+    told = [each['found'] for each in found if each['what'] == 'package stranger']
+    for what, reason in (
+        ("'bad' (no_module:FORMAT) of shipdrag.formats", "No module named 'no_module'"),
+        ("'none' (stranger:ESTIMATOR) of shipdrag.formats", "Estimator(name='mine'"),
+        ("'broken' (no_module:EFFECT) of shipdrag.effects", "No module named 'no_module'"),
+        ("'paper' (no_module:STUDY) of shipdrag.papers", "No module named 'no_module'"),
+        ("'lost' (stranger:NOTHING) of shipdrag.estimators", "module 'stranger' has no"),
+    ):
+        assert sum(f'{what} is left out: {reason}' in each for each in told) == 1
+        assert done.stderr.count(f'{what} is left out: {reason}') == 1
+    assert len(told) == 5
+    assert done.stderr.count("mend or uninstall the package 'stranger'") == 5

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -150,6 +151,18 @@ def test_a_dated_version_without_a_tag_is_released(heading, tag, found, tmp_path
     # nothing is built or tagged without it
     later = job['steps'][job['steps'].index(step) + 1 :]
     assert all(each['if'] == "steps.version.outputs.tag != ''" for each in later)
+
+
+def test_no_other_version_is_dated_than_the_one_that_is_tagged_next() -> None:
+    """One that was tagged keeps its date; nothing here was."""
+    dated = re.findall(
+        r'^## \[(.+?)\] - \d{4}-',
+        (ROOT / 'CHANGELOG.md').read_text(encoding='utf-8'),
+        re.MULTILINE,
+    )
+    git = ['git', '-C', str(ROOT), 'tag', '--list', 'v*']
+    tags = subprocess.run(git, capture_output=True, text=True, check=False).stdout.split()
+    assert {f'v{each}' for each in dated} <= {*tags, f'v{shipdrag_ros.__version__}'}
 
 
 def test_checksums_are_of_all_that_is_released(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -203,7 +203,7 @@ class _Facts:
         self._chunk = self._expected.add_indexed(chunk.chunk, *chunk.place.span)
         stated = chunk.chunk.message_start_time, chunk.chunk.message_end_time
         if times_ns not in (None, stated):
-            text = f'times {stated}, in it are {times_ns}'
+            text = 'times {} to {} ns, in it are {} to {} ns'.format(*stated, *times_ns)
             self._add(offset, 'chunk', DamageKind.DISAGREES, text)
 
     def _message_index(self, place: records.Place) -> None:
@@ -230,7 +230,7 @@ class _Facts:
             missing = sorted(set(self._entries) - set(chunk.message_index_offsets))
             if missing:
                 offset = chunk.chunk_start_offset + chunk.chunk_length
-                text = f'channels {missing}'
+                text = f'of channels {", ".join(map(str, missing))}'
                 self._add(offset, 'message_index', DamageKind.MISSING, text)
 
     def compare(self) -> None:
@@ -276,7 +276,7 @@ class _Facts:
     def _compare(self, place: records.Place, stated: Any) -> None:
         key = key_of(stated)
         actual = self._expected.records.get(key, ())
-        kind, text = DamageKind.DISAGREES, '{}, in the data {}'
+        kind, text = DamageKind.DISAGREES, None
         match stated:
             case mcap.Footer():
                 return
@@ -290,7 +290,23 @@ class _Facts:
             case _ if actual == ():
                 kind, text = DamageKind.MISPLACED, f'nothing of that kind is at byte {key[1]}'
         if actual not in (None, stated):  # of a damaged chunk nothing is known
-            self._add(place.offset, place.name, kind, text.format(stated, actual))
+            differs = _difference(stated, actual) if text is None else text
+            self._add(place.offset, place.name, kind, differs)
+
+
+def _difference(stated: Any, actual: Any) -> str:
+    """Say in which parts two records of a kind differ, and how."""
+    said = []
+    for each in fields(stated):
+        one, other = getattr(stated, each.name), getattr(actual, each.name)
+        name = each.name.replace('_', ' ')
+        if one != other and isinstance(one, dict):
+            numbers = sorted({key for key, _ in one.items() ^ other.items()})
+            said.append(f'{name} of {", ".join(map(str, numbers))}')
+        elif one != other:
+            shown = name if isinstance(one, bytes) else f'{name} {one}, in the data {other}'
+            said.append(shown)
+    return '; '.join(said)
 
 
 def _name(kind: type) -> str:

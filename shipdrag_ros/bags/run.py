@@ -9,10 +9,10 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import zstandard
@@ -33,8 +33,8 @@ from shipdrag_ros.messages import (
     types,
 )
 from shipdrag_ros.messages.decoding import decode_batch
-from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
-from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.messages.topics import EVENTS, RESISTANCE, TOPICS
+from shipdrag_ros.samples import FURTHER, Block, concatenate
 from shipdrag_ros.ship import SHIP_FILE, Ship
 
 WindowSpan = tuple[float, float]
@@ -230,6 +230,31 @@ class Run:
             return None
         self.note([f'{path} holds for this run'])
         return Ship.load(path)
+
+    def about(self) -> dict[str, Any]:
+        """
+        Return what `shipdrag info` has of it.
+        """
+        topics = self.topics_inside()  # a part is read for it, and may be found damaged
+        start_ns, end_ns = self.span_ns or (None, None)
+        found = {*FURTHER, *(topic.input for topic in topics)}
+        return {
+            'bag': self.name,
+            'files': tuple(map(str, self.paths)),
+            'size_bytes': sum(path.stat().st_size for path in self.paths),
+            'start_ns': start_ns,
+            'end_ns': end_ns,
+            'duration_s': self.duration_s,
+            'messages': sum(topic.messages for topic in topics),
+            'compression': self.compression,
+            'indexed': self.indexed,
+            'topics': [asdict(topic) for topic in topics],
+            'missing_inputs': tuple(name for name in TOPICS if name not in found),
+            'attachments': {name: len(text.encode()) for name, text in self.attachments.items()},
+            'software': self.software,
+            'node': self.node,
+            'warnings': self.warnings,
+        }
 
     @property
     def span_ns(self) -> tuple[int, int] | None:

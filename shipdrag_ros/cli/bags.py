@@ -17,8 +17,6 @@ from shipdrag_ros.bags.recover import Recovery, recover
 from shipdrag_ros.cli.arguments import add, add_bags, bag, new_file, open_parts
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
-from shipdrag_ros.messages import TOPICS
-from shipdrag_ros.samples import FURTHER
 
 
 def add_info(parser: argparse.ArgumentParser) -> None:
@@ -47,34 +45,11 @@ def run_info(options: argparse.Namespace) -> int:
     """
     output = Output(options.json)
     runs = open_parts(options.bags, output, remap=options.remap)
-    documents = [_document_info(each) for each in runs]
+    documents = [each.about() for each in runs]
     for each, about in zip(runs, documents, strict=True):
         _show_info(output, each, about)
     output.json({'bags': documents})
     return 0
-
-
-def _document_info(run: Run) -> dict[str, Any]:
-    topics = run.topics_inside()  # a part is read for it, and may be found damaged
-    start_ns, end_ns = run.span_ns or (None, None)
-    found = {*FURTHER, *(topic.input for topic in topics)}
-    return {
-        'bag': run.name,
-        'files': tuple(map(str, run.paths)),
-        'size_bytes': sum(path.stat().st_size for path in run.paths),
-        'start_ns': start_ns,
-        'end_ns': end_ns,
-        'duration_s': run.duration_s,
-        'messages': sum(topic.messages for topic in topics),
-        'compression': run.compression,
-        'indexed': run.indexed,
-        'topics': [asdict(topic) for topic in topics],
-        'missing_inputs': tuple(name for name in TOPICS if name not in found),
-        'attachments': {name: len(text.encode()) for name, text in run.attachments.items()},
-        'software': run.software,
-        'node': run.node,
-        'warnings': run.warnings,
-    }
 
 
 def _show_info(output: Output, run: Run, about: dict[str, Any]) -> None:

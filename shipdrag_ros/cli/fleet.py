@@ -307,7 +307,12 @@ def _answer(output: Output, store: Path, query: str) -> None:
         raise FleetError('--sql: that is no question; begin with SELECT')
     columns = tuple(answer.column_names)
     rows = [tuple(row) for row in zip(*(column.to_pylist() for column in answer.columns))]
-    output.table(Table(columns, tuple(tuple(_cell(value) for value in row) for row in rows)))
+    cells = [tuple(map(_cell, row)) for row in rows]
+    if sum(len(max(each, key=len)) + 2 for each in zip(columns, *cells)) <= output.width:
+        output.table(Table(columns, tuple(cells)))
+    else:  # the columns do not fit beside each other
+        for row in cells:
+            output.table(Table(('', ''), tuple(zip(columns, row))), '')
     output.json(
         {'columns': list(columns), 'rows': [[_plain(cell) for cell in row] for row in rows]}
     )

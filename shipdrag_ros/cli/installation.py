@@ -11,6 +11,7 @@ import shutil
 import socket
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import shtab
@@ -19,7 +20,10 @@ from shipdrag_ros import __version__, cli
 from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import CheckResult, CheckState, Output
 from shipdrag_ros.display import Table
-from shipdrag_ros.imports import EXTRA_OF, pip_name
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.imports import EXTRA_OF, LEFT_OUT, pip_name
+from shipdrag_ros.parameters import ESTIMATORS
+from shipdrag_ros.simulation.effects import LIBRARY
 
 BROKEN = 1
 _PAGE_PORT = 8088
@@ -113,6 +117,7 @@ def findings(out: Path) -> Iterator[CheckResult]:
     )
     yield _machine()
     yield from _packages()
+    yield from _left_out()
     yield _discovery()
     yield _compiled()
     yield _port(_PAGE_PORT)
@@ -149,6 +154,20 @@ def _is_there(name: str) -> bool:
         return importlib.util.find_spec(name) is not None
     except (ImportError, ValueError):
         return False
+
+
+def _left_out() -> Iterator[CheckResult]:
+    from shipdrag_ros.estimation.estimators import named  # who looks at all of it pays for it
+    from shipdrag_ros.sources import formats
+
+    for name in ESTIMATORS:
+        with suppress(EstimationError):
+            named(name)
+    for look in (formats.found, LIBRARY.keys, cli.verbs):
+        len(look())
+    for point, why in LEFT_OUT.items():
+        what = f'package {point.dist.name if point.dist else "?"}'
+        yield CheckResult(what, _LOOK, why, 'mend or uninstall it')
 
 
 def _discovery() -> CheckResult:

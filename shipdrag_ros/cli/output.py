@@ -137,6 +137,11 @@ class Output:
         self._result = _console(sys.stderr if json_to == STDOUT else sys.stdout)
         self._log = _console(sys.stderr)
 
+    @property
+    def width(self) -> int:
+        """Characters in a line of the result."""
+        return self._result.width
+
     def say(self, *texts: str, lead: str = '') -> None:
         """
         Print lines of the result, each behind a lead.

@@ -14,6 +14,7 @@ from shipdrag_ros.diagnosis.document import EarlierDiagnosis, document, read_ear
 from shipdrag_ros.diagnosis.result import Candidate, Compared, DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.learning import words as learnt_words
 from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.learning.search import learn as learn_runs
 from shipdrag_ros.library import replaying
@@ -110,10 +111,7 @@ class Diagnosis(Shown):
             )
         return with_effects(self.ship, self.found.effects)
 
-    def to_dict(self) -> dict[str, Any]:
-        """
-        Return the JSON document of `shipdrag diagnose`; arrays are numpy's.
-        """
+    def _document(self) -> Mapping[str, Any]:
         return document(self.found, self.ship)
 
     def _lines(self) -> Sequence[str]:
@@ -302,10 +300,34 @@ def diagnose(
     return Diagnosis(found, used, tuple(listener.lines))
 
 
+class LearntEffect(Shown, Learnt):
+    """
+    What was learnt of some runs, `Learnt`, as it shows itself.
+    """
+
+    def _document(self) -> Mapping[str, Any]:
+        return learnt_words.document(self)
+
+    def _lines(self) -> Sequence[str]:
+        return (learnt_words.sentence(self), *learnt_words.lines(self))
+
+    def table(self) -> Table:
+        """
+        Show how probable each explanation of the runs is.
+        """
+        return learnt_words.table(self)
+
+    def _title(self) -> str:
+        return 'nothing is learnt' if self.term is None else f'{self.term.name} is learnt'
+
+    def _columns(self) -> Mapping[str, Any]:
+        return {'explanation': [*self.probability], 'probability': [*self.probability.values()]}
+
+
 @says_it_in_python
 def learn(
     records: Record | Sequence[Record], *, ship: ShipGiven = None, name: str = 'learnt'
-) -> Learnt:
+) -> LearntEffect:
     """
     Learn the effect that several runs of a ship share and the library has no name for.
 
@@ -320,7 +342,7 @@ def learn(
 
     Returns
     -------
-    Learnt
+    LearntEffect
         Its `term` is None where nothing may be written, and `reason` says why;
         `term.to_yaml()` is the text of a file.
 
@@ -355,7 +377,7 @@ def learn_from(
     given: Ship | None,
     name: str,
     progress: Progress = silent,
-) -> Learnt:
+) -> LearntEffect:
     """
     Learn from runs that are open; what the verb and a script share.
 
@@ -375,4 +397,4 @@ def learn_from(
     check_name(name)
     coasts, ship, parameters = coasts_of(listener, runs, given, progress, whole=True)
     coasts = sorted(coasts, key=lambda coast: coast.window.start_ns)
-    return learn_runs(coasts, ship, parameters, name=name, progress=progress)
+    return LearntEffect(**vars(learn_runs(coasts, ship, parameters, name=name, progress=progress)))

@@ -113,6 +113,29 @@ class Forecasts(Shown):
     made: tuple[GlideForecast, ...]
     without: tuple[tuple[str, str], ...] = ()
 
+    def _document(self) -> Mapping[str, Any]:
+        made: list[dict[str, Any]] = []
+        not_made: list[tuple[object, ...]] = []
+        for each in self.made:
+            if each.checked is None:
+                not_made.append((each.bag, each.stop_ns, each.after_s, each.why))
+                continue
+            made.append(
+                {
+                    'bag': each.bag,
+                    'stop_ns': each.stop_ns,
+                    'made_ns': each.checked.forecast.made_ns,
+                    'over_ground': each.checked.forecast.over_ground,
+                    'speeds': [_milestone(one) for one in each.checked.milestones],
+                    'inside': each.checked.inside,
+                    'interval_score': each.checked.interval_score,
+                    'not_compared': each.why or None,
+                }
+            )
+        not_made += [(bag, None, None, why) for bag, why in self.without]
+        keys = ('bag', 'stop_ns', 'after_s', 'reason')
+        return {'forecasts': made, 'not_made': [dict(zip(keys, each)) for each in not_made]}
+
     def _lines(self) -> Sequence[str]:
         none = [f'{bag}: {why}' for bag, why in self.without]
         return [*(_line(each) for each in self.made), *none]
@@ -194,6 +217,14 @@ def _draw(axis: Axes, forecast: Forecast, stop_ns: int, unit_m_s: float) -> None
     axis.fill_between(
         minutes, low / unit_m_s, high / unit_m_s, color=line.get_color(), alpha=0.2, lw=0.0
     )
+
+
+def _milestone(one: Passed) -> Mapping[str, Any]:
+    return {
+        'speed_m_s': one.foretold.speed_m_s,
+        'time_s': {**one.foretold.time_s._asdict(), 'was': one.was_s},
+        'distance_m': {**one.foretold.distance_m._asdict(), 'was': one.was_m},
+    }
 
 
 def milestone_columns(milestones: Sequence[Milestone]) -> dict[str, Any]:
@@ -346,6 +377,21 @@ class IfStopped(Shown):
     measured: str
     gliding: bool
     forecast: Forecast
+
+    def _document(self) -> Mapping[str, Any]:
+        return {
+            'if_stopped_now': {
+                'bag': self.bag,
+                'made_ns': self.forecast.made_ns,
+                'speed_m_s': float(self.forecast.speed_m_s[0]),
+                'measured': self.measured,
+                'hull': self.hull,
+                'gliding': self.gliding,
+                'over_ground': self.forecast.over_ground,
+                'speeds': [_milestone(each) for each in self.passed],
+                'why': None if self.passed else NO_WAY,
+            }
+        }
 
     def _lines(self) -> Sequence[str]:
         mass = self.ship.mass_kg

@@ -29,7 +29,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.playback import StopTime
 from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve, together
-from shipdrag_ros.replay.tables import document
+from shipdrag_ros.replay.tables import coastdown_document, document
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
 from shipdrag_ros.ship import SHIP_FILE, Ship
 
@@ -119,6 +119,9 @@ class Coastdown(ShownResistance):
                 f'{self.event.failure or "no reason given"}'
             )
         return self.event.estimate.valid_curve
+
+    def _document(self) -> Mapping[str, Any]:
+        return coastdown_document(self.bag, self.event)
 
     def _lines(self) -> Sequence[str]:
         return words.summary(self.event, self.ship)
@@ -260,6 +263,9 @@ class Record(Shown):
         ship = self.given if SHIP_FILE in self.runs[0].attachments else self.ship
         self.runs[0].save(out, {} if ship is None else {SHIP_FILE: ship.to_yaml()})
         return out
+
+    def _document(self) -> Mapping[str, Any]:
+        return {'bags': [run.about() for run in self.runs]}
 
     def _lines(self) -> Sequence[str]:
         ship = self.ship
@@ -420,7 +426,7 @@ def read(
     from shipdrag_ros.library.logs import is_frame
 
     given = ship_of(ship)
-    alone = isinstance(source, str | PathLike) or is_frame(source)
+    alone = isinstance(source, str | PathLike | Mapping) or is_frame(source)
     several = source if not alone and isinstance(source, Iterable) else [source]
     bags: list[Path] = []
     others: list[Any] = []
@@ -523,10 +529,7 @@ class Resistance(ShownResistance):
             )
         raise EstimationError(' '.join(self.summary().splitlines()))
 
-    def to_dict(self) -> dict[str, Any]:
-        """
-        Return the JSON document of `shipdrag replay`; arrays are numpy's.
-        """
+    def _document(self) -> Mapping[str, Any]:
         return document(self.runs)
 
     def forecast(self, after: float | Sequence[float] = forecasts.AFTER_S) -> forecasts.Forecasts:
@@ -569,7 +572,8 @@ class Resistance(ShownResistance):
     def _lines(self) -> Sequence[str]:
         lines = []
         for run in self.runs:
-            lines += [*run.summary(), *(f'Warning: {warning}' for warning in run.warnings)]
+            said = (line.replace(', see below', '') for line in run.summary())  # nothing follows
+            lines += [*said, *(f'Warning: {warning}' for warning in run.warnings)]
         whole = together(self.runs)
         if whole.why_not:
             lines.append(f'Not combined: {whole.why_not}.')

@@ -13,7 +13,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, plain_json
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import what_to_install
 from shipdrag_ros.sources import formats
@@ -141,7 +141,7 @@ class Shown(ABC):
     A result that says what it holds.
 
     A short `repr`, `summary()` in sentences, `table()` as text, both of them in a
-    notebook, `to_frame()` in pandas and `plot()` in matplotlib.
+    notebook, `to_dict()` for JSON, `to_frame()` in pandas and `plot()` in matplotlib.
     """
 
     def summary(self) -> Text:
@@ -167,6 +167,16 @@ class Shown(ABC):
     @abstractmethod
     def _columns(self) -> Mapping[str, Any]:
         """Return the columns of the frame, in SI units."""
+
+    @abstractmethod
+    def _document(self) -> Mapping[str, Any]:
+        """Return what `to_dict` makes plain."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        Return the JSON document of the command line, as `json.dumps` takes it.
+        """
+        return dict(plain_json(self._document()))
 
     def to_frame(self) -> DataFrame:
         """

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import reprlib
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -27,7 +28,7 @@ from shipdrag_ros.replay.run_result import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import SHIP_FILE, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import STANDARD_INPUTS, START_NS, Scenario, sense, standard_sensors
-from shipdrag_ros.simulation.effect import DAY_S
+from shipdrag_ros.simulation.effect import DAY_S, Effect
 from shipdrag_ros.simulation.effects import find, parse, terms, values_of
 
 SPEED_FRACTION = 0.8
@@ -48,6 +49,8 @@ _RESISTANCE = (
 )
 Size = float | str | Mapping[str, float | str]
 """Of an effect: its first parameter, or all of them by name."""
+Effects = Mapping[str, Size] | Iterable[str | StatedEffect | Effect]
+"""Sizes by name, or a list."""
 
 NAME = 'simulated'
 
@@ -218,7 +221,7 @@ class Sensing(TypedDict, total=False):
 @says_it_in_python
 def simulate(
     ship: ShipGiven,
-    effects: Mapping[str, Size] | None = None,
+    effects: Effects | None = None,
     *,
     speed_m_s: float | None = None,
     duration_s: float = 1500.0,
@@ -236,7 +239,9 @@ def simulate(
         With a baseline, or the path of its file.
     effects
         What acts in addition, by name: `{'fouling': 0.2}` for the first parameter, or
-        `{'current': {'along_track_m_s': 0.4}}`. docs/effects.md has all, in SI.
+        `{'current': {'along_track_m_s': 0.4}}`; or a list, of `'fouling=0.2'` as the command
+        line takes it, or of effects as a ship or a diagnosis has them. docs/effects.md has
+        all, in SI.
     speed_m_s
         Steady speed through water before the stop [m/s]; None: 0.8 of the highest
         speed of the baseline.
@@ -279,8 +284,6 @@ def simulate(
     hull = ship_of(ship)
     if hull is None:
         raise SimulationError('no ship is given: a Ship, or the path of a ship file')
-    if not isinstance(effects or {}, Mapping):
-        raise SimulationError(f"effects {effects!r}: give names with sizes, {{'fouling': 0.3}}")
     if not isinstance(seed, int | np.integer) or seed < 0:
         raise SimulationError(f'seed {seed!r}: expected a whole number from 0 on')
     more = {**sensing}
@@ -298,7 +301,7 @@ def simulate(
         duration_s=duration_s,
         heading_rad=heading_rad,
         seed=seed,
-        effects=tuple(_stated(name, size) for name, size in (effects or {}).items()),
+        effects=_stated(effects),
         start_ns=START_NS if start is None else moment_ns(str(start)),
         **more,  # type: ignore[arg-type]
     )
@@ -313,7 +316,24 @@ def simulate(
     return Record([run])
 
 
-def _stated(name: str, size: Size) -> StatedEffect:
+def _stated(effects: Effects | None) -> tuple[StatedEffect, ...]:
+    """Read effects and their sizes."""
+    if isinstance(effects, Mapping):
+        return tuple(_sized(name, size) for name, size in effects.items())
+    if not isinstance(effects, str) and isinstance(given := effects or (), Iterable):
+        read = [parse(each) if isinstance(each, str) else each for each in given]
+        if all(hasattr(each, 'parameters') for each in read):
+            return tuple(
+                StatedEffect(each.name, {} if isinstance(each, Effect) else dict(each.parameters))
+                for each in read
+            )
+    raise SimulationError(
+        f"effects {reprlib.repr(effects)}: give names with sizes, {{'fouling': 0.3}} or "
+        "['fouling=0.3']"
+    )
+
+
+def _sized(name: str, size: Size) -> StatedEffect:
     """Read an effect and its size."""
     first = find(name).parameters[0].name
     values = size if isinstance(size, Mapping) else {first: size}

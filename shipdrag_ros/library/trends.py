@@ -78,10 +78,7 @@ class Trends(Shown):
         known = ', '.join(repr(each.series.name) for each in self.ships) or 'none'
         raise FleetError(f'no ship is called {ship!r}; there are: {known}')
 
-    def to_dict(self) -> dict[str, Any]:
-        """
-        Return the JSON document of `shipdrag trend`; arrays are numpy's.
-        """
+    def _document(self) -> Mapping[str, Any]:
         return {
             'ships': [trend.to_dict() for trend in self.ships],
             'skipped': [{'bag': bag, 'reason': reason} for bag, reason in self.skipped],

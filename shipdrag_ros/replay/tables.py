@@ -167,7 +167,7 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
     whole = together(runs)
     found = {
         'coastdowns': [
-            _coastdown(run.bag, coastdown) for run in runs for coastdown in run.coastdowns
+            coastdown_document(run.bag, coastdown) for run in runs for coastdown in run.coastdowns
         ],
         'not_coastdowns': [
             _not_coastdown(run.bag, dismissed) for run in runs for dismissed in run.not_coastdowns
@@ -211,7 +211,10 @@ def _current(found: Combined | Estimate) -> dict[str, Any] | None:
     return {'value': found.current_m_s, 'sd': found.current_sigma_m_s}
 
 
-def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
+def coastdown_document(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
+    """
+    Return what the document has of one coastdown.
+    """
     return {
         'bag': bag,
         'start_ns': coastdown.start_ns,

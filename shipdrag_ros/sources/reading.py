@@ -362,16 +362,16 @@ def _imported(
     path: Path, remap: Mapping[str, str] | None, show: Callable[[list[str]], None] | None
 ) -> Run:
     declared, log = format_of(path, {}), Log()
+    advice = ' (make a bag of it with `shipdrag import`, which takes these options)'
     try:
         result = declared.read(Job(path), log)
     except ImportDataError as error:
         if '--' not in str(error):
             raise
-        raise ImportDataError(
-            f'{error} (make a bag of it with `shipdrag import`, which takes these options)'
-        ) from error
+        raise ImportDataError(f'{error}{advice}') from error
     if show is not None:
-        show(result.told(path, declared.kind))
+        told = result.told(path, declared.kind)
+        show([f'{line}{advice}' if ' --' in line else line for line in told])
     return LogRun(log, [path], remap)
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,13 @@ def test_of_a_damaged_index_it_is_said_that_the_data_are_whole(steady_bag, tmp_p
     assert damage.keys() == {'offset', 'record', 'kind'}
     assert damage['record'] == 'summary'
     assert main(['check', str(output)]) == 0
+    content[len(content) // 2] ^= 4  # and a chunk
+    path.write_bytes(content)
+    assert main(['check', str(path)]) == 1
+    said = ' '.join(capsys.readouterr().out.split())
+    assert re.search(
+        r' channel message counts of 1, 2, 3, 4; message count 1208, in the data \d+ ', said
+    )
 
 
 @pytest.mark.parametrize('verb', [['check'], ['recover', '-o', 'saved.mcap']])

@@ -13,7 +13,6 @@ import pytest
 
 import shipdrag_ros as sd
 from shipdrag_ros.cli import main
-from shipdrag_ros.cli.forecast import document
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, simulate
 
@@ -62,7 +61,7 @@ def test_a_forecast_that_is_not_made_says_why(found: dict[str, Any]) -> None:
 
 def test_a_script_gets_the_same(found: dict[str, Any], coastdown_bag: Path) -> None:
     made = sd.estimate(sd.read(coastdown_bag)).forecast(after=(300.0, 600.0, 5000.0))
-    assert json.loads(json.dumps(document(made))) == found
+    assert json.loads(json.dumps(made.to_dict())) == found
     assert repr(made) == '<Forecasts: 2 forecasts of 1 glide>'
     assert '100% of what followed lies inside the bands' in made.summary()
     axis = made.plot()

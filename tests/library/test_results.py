@@ -14,6 +14,9 @@ import pytest
 from matplotlib.axes import Axes
 
 import shipdrag_ros as sd
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import StatedEffect
+from shipdrag_ros.simulation.effects import find
 
 
 @pytest.fixture(scope='module')
@@ -167,6 +170,8 @@ def test_where_there_is_no_coastdown_it_says_why() -> None:
     assert found.coastdowns == ()
     assert repr(found) == '<Resistance: Vitus Bering, no coastdowns>'
     assert found.summary().startswith('No coastdown found')
+    slow = sd.simulate(sd.Ship.example(), duration_s=25.0, lead_in_s=400.0)
+    assert 'one stretch was looked at and dismissed.' in sd.estimate(slow).summary()
     for ask in (lambda: found.curve, found.plot, found.to_frame):
         with pytest.raises(sd.ShipdragError, match='No coastdown found'):
             ask()
@@ -200,6 +205,9 @@ def test_what_is_no_record_is_refused() -> None:
             sd.trends(source)  # type: ignore[arg-type]
     for arguments, why in (
         ({'effects': 'fouling=0.3'}, 'give names with sizes'),
+        ({'effects': [3.0] * 100}, r'effects \[3\.0, 3\.0, .{,30}\]: give names with sizes'),
+        ({'effects': ['weed=1']}, "'weed' is not known"),
+        ({'effects': [find('fouling')]}, 'friction_factor is missing, expected'),
         ({'seed': -1}, 'expected a whole number'),
         ({'lead_in': 3.0}, 'lead_in'),
         ({'duration_s': 1e12}, r'duration_s is 1e\+12, expected at most 1e\+06'),
@@ -245,3 +253,12 @@ def test_a_simulation_takes_the_path_of_a_ship_a_date_and_the_name_of_a_sensor(t
     assert record.runs[0].span_ns == same.runs[0].span_ns
     with pytest.raises(sd.ShipdragError, match='no ship is given'):
         sd.simulate(None)
+
+
+def test_effects_are_given_by_name_or_as_a_list() -> None:
+    ship, short = sd.Ship.example(), {'duration_s': 10.0, 'lead_in_s': 10.0}
+    stated = [StatedEffect('fouling', {'friction_factor': Parameter(0.2, 0.0)})]
+    for given in (['fouling=0.2'], stated, ('fouling=0.2',)):
+        made = sd.simulate(ship, given, **short)
+        assert made.truth.to_yaml() == sd.simulate(ship, {'fouling': 0.2}, **short).truth.to_yaml()
+    assert made.truth.settings['effects'][0]['parameters'] == {'friction_factor': 0.2}

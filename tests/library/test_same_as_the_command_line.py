@@ -39,8 +39,27 @@ def test_simulated_readings_and_truth(record: sd.Record, tmp_path: Path) -> None
 def test_estimates(bag: Path, tmp_path: Path) -> None:
     out = tmp_path / 'replay.json'
     assert main(['replay', str(bag), f'--json={out}']) == 0
-    found = sd.estimate(sd.read(bag))
+    record = sd.read(bag)
+    found = sd.estimate(record)
     assert json_text(found.to_dict()) == out.read_text()
+    whole = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert [json.loads(json.dumps(each.to_dict())) for each in found.coastdowns] == whole[
+        'coastdowns'
+    ]
+    assert main(['info', str(bag), f'--json={out}']) == 0
+    assert json.loads(json.dumps(record.to_dict())) == json.loads(out.read_text())
+
+
+def test_what_is_learnt(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / 'learn.json'
+    assert main(['learn', str(bag), '-o', str(tmp_path / 'x.yaml'), f'--json={out}']) == 0
+    found = sd.learn(sd.read(bag), name='x')
+    assert json.loads(json.dumps(found.to_dict())) == json.loads(out.read_text())
+    printed = capsys.readouterr().out.splitlines()
+    assert found.summary().splitlines() == printed[: len(found.summary().splitlines())]
+    assert repr(found) == '<LearntEffect: nothing is learnt>'
+    assert '<td>something smooth<' in found._repr_html_()
+    assert found.to_frame().probability.sum() == pytest.approx(1.0)
 
 
 def test_estimates_of_a_window(bag: Path, tmp_path: Path) -> None:

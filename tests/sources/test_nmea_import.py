@@ -27,6 +27,7 @@ from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel
 from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.nmea import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.reading import read_any
 
 from .conftest import into_bag
 from .log_samples import sentence
@@ -712,7 +713,7 @@ def test_a_time_of_receipt_may_state_no_zone(written: str) -> None:
     assert not result.days_early
 
 
-def test_dates_before_a_rollover_are_said_where_receipts_are_of_today() -> None:
+def test_dates_before_a_rollover_are_said_where_receipts_are_of_today(tmp_path: Path) -> None:
     lines = [
         f'{datetime.fromtimestamp(START_NS // SECOND + k, UTC):%Y-%m-%dT%H:%M:%SZ} '
         f'{rmc(k, day="140704")}'
@@ -721,6 +722,11 @@ def test_dates_before_a_rollover_are_said_where_receipts_are_of_today() -> None:
     result, _ = run('\n'.join(lines))
     assert result.days_early == 7168
     assert any('give --date 2024-02-28' in line for line in result.summary(Path('x')))
+    log, said = tmp_path / 'log.nmea', list[str]()
+    log.write_text('\n'.join(lines))
+    read_any([log], show=said.extend)
+    (line,) = (line for line in said if '--date 2024-02-28' in line)
+    assert '`shipdrag import`, which takes these' in line
     mended, block = run('\n'.join(lines), date=date(2024, 2, 28))
     assert mended.start_ns == int(block.stamp_ns[0]) == START_NS
     assert not any('--date' in line for line in mended.summary(Path('x')))

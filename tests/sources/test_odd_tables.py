@@ -153,6 +153,12 @@ def test_lines_behind_an_open_quotation_mark_are_said(tmp_path: Path) -> None:
     assert '29 line(s) were taken as part of a cell in quotation marks' in shown
 
 
+def test_of_two_columns_of_one_name_the_other_is_not_used(tmp_path: Path) -> None:
+    _, shown = read(tmp_path, 'time,stw_kn,stw_kn', [f'{i},10,11' for i in range(20)])
+    assert "speed_through_water <- '2' [kn]" in shown
+    assert "Columns not used: '3'" in shown
+
+
 def test_a_title_with_empty_cells_behind_it(tmp_path: Path) -> None:
     block, _ = read(tmp_path, 'Sea trial;;\ntime;STW [kn];Note', [f'{i};10;x' for i in range(20)])
     assert len(block) == 20

@@ -14,8 +14,6 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
-from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.sources import formats
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -269,20 +267,3 @@ def test_a_format_of_another_package_is_found_by_its_entry_point(tmp_path, monke
     with pytest.raises(SystemExit):
         main(['import', str(other), '-o', str(tmp_path / 'b.mcap'), '--epoch', '1e9'])
     assert 'argument --epoch: of a log of arrows, and this is a CSV' in capsys.readouterr().err
-
-
-def test_a_format_that_cannot_be_loaded_is_named(tmp_path, monkeypatch) -> None:
-    about = tmp_path / 'broken-1.0.dist-info'
-    about.mkdir()
-    (about / 'METADATA').write_text('Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n')
-    (about / 'entry_points.txt').write_text('[shipdrag.formats]\nbroken = no_module:FORMAT\n')
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(ImportDataError, match="the format 'broken' of 'no_module:FORMAT'"):
-        formats.found()
-
-
-def test_the_entry_points_of_the_package_are_those_of_its_folder() -> None:
-    written = (ROOT / 'setup.py').read_text()
-    for point in formats.points():
-        place = point.value.removeprefix(f'{formats.__name__}.').removesuffix(':FORMAT')
-        assert f"'{point.name}': '{place}'" in written

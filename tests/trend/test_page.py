@@ -87,6 +87,10 @@ def test_questions_in_sql_read_the_store_and_no_file(fleet_store, tmp_path, caps
     assert not (tmp_path / 'x.csv').exists()
     assert main(['trend', str(fleet_store), '--sql', 'select froude from coastdowns limit 1']) == 0
     assert '77 values' in capsys.readouterr().out
+    assert main(['trend', str(fleet_store), '--sql', 'select * from coastdowns limit 2']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) < 120
+    assert [line.split()[-1] for line in lines if line.startswith('froude  ')] == ['values'] * 2
     assert 'the tables are runs (ship, date, added_percent' in said
     assert 'begin with SELECT' in said
 

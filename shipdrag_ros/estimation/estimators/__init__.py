@@ -19,6 +19,7 @@ from typing import ParamSpec, TypeVar
 from shipdrag_ros.errors import EstimationError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.imports import LEFT_OUT, load
 from shipdrag_ros.parameters import ESTIMATOR_POINTS, FORMER_ESTIMATORS, Parameters
 from shipdrag_ros.ship import Ship
 
@@ -128,12 +129,9 @@ def named(name: str) -> Estimator:
 
 
 def _load(name: str) -> Estimator:
-    try:
-        found = ESTIMATOR_POINTS[name].load()
-        if not isinstance(found, Estimator) or found.name != name:
-            raise TypeError(f'{found!r}, expected an Estimator of this name')
-    except Exception as error:  # whatever the code of a stranger does
-        raise EstimationError(
-            f'the estimator {name!r} cannot be loaded: {error!r}; mend or remove its package'
-        ) from error
-    return found
+    point = ESTIMATOR_POINTS[name]
+    found = load([point], Estimator)
+    if name not in found:
+        why = LEFT_OUT.get(point, f'{point.value} has another name')
+        raise EstimationError(f'the estimator {name!r} cannot be used: {why}')
+    return found[name][1]

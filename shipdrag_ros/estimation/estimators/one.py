@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from shipdrag_ros.display import plus_minus
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.estimators import Estimator
 from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows
@@ -283,7 +284,7 @@ def _held_unit(found: RunPosterior) -> float:
 def _log_scale_note(scale: float, sd: float, which: str) -> str:
     """Say by how much a log is off, and that the band holds it."""
     return (
-        f'the {which} reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
+        f'the {which} reads {plus_minus(100.0 * scale, 200.0 * sd, "+")} % off (two standard '
         'deviations): taken out, and in the band'
     )
 
@@ -305,7 +306,7 @@ def _wrong_notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
             size, sd = factor * found.mean[at], factor * np.sqrt(found.covariance[at, at])
             yield (
                 f'{" and ".join(names)}: {what} with probability {chance:.2g}, which is in the '
-                f'band ({size:+.2g} ± {2.0 * sd:.1g} {unit}, two standard deviations)'
+                f'band ({plus_minus(size, 2.0 * sd, "+")} {unit}, two standard deviations)'
             )
 
 

@@ -15,12 +15,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, lru_cache
-from importlib import import_module, resources
+from importlib import resources
 from itertools import combinations
-from pkgutil import iter_modules
 
 from shipdrag_ros.errors import EffectFileError, SimulationError
-from shipdrag_ros.imports import of_other_packages
+from shipdrag_ros.imports import load, points
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import LearntTerm, Ship, StatedEffect
 from shipdrag_ros.ship.term import check_name
@@ -32,18 +31,10 @@ GROUP = 'shipdrag.effects'
 
 @cache
 def _every() -> dict[str, Effect]:
-    every: dict[str, Effect] = {}
-
-    def accept(effect: object) -> Effect:
-        if not isinstance(effect, Effect) or effect.name in every:
-            raise TypeError(f'{effect!r}, expected an Effect with a name that is not taken')
-        return effect
-
-    own = [*effects_in(resources.files('shipdrag_ros') / 'data' / 'effects.yaml')]
-    own += [import_module(f'{__name__}.{module.name}').EFFECT for module in iter_modules(__path__)]
-    every |= {effect.name: accept(effect) for effect in own}
-    for _, effect in of_other_packages(GROUP, accept, own=__name__):
-        every[effect.name] = effect
+    own = effects_in(resources.files('shipdrag_ros') / 'data' / 'effects.yaml')
+    every = {effect.name: effect for effect in own}
+    modules = points(GROUP, 'EFFECT', 'simulation/effects/[!_]*.py')
+    every |= {name: effect for name, (_, effect) in load(modules, Effect, taken=every).items()}
     return dict(sorted(every.items()))
 
 

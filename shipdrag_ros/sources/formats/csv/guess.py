@@ -162,11 +162,11 @@ class FirstRows:
         self.header = table.header or ()
         self.roles: dict[str, list[NamedColumn]] = {}
         self._rows = table.first_rows(_SAMPLE_ROWS)
-        for place, name in enumerate(self.header):
+        for place in range(len(self.header)):
             role, unit = role_and_unit(*table.about(place))
-            key = name if self.header.count(name) == 1 else str(place + 1)
             if role:
-                self.roles.setdefault(role, []).append(NamedColumn(key, place, unit))
+                named = NamedColumn(table.key(place), place, unit)
+                self.roles.setdefault(role, []).append(named)
         self._style = self._rows[np.arange(len(self._rows)) < _STYLE_ROWS]
         texts = (cells for cells in self._style.columns if not are_numbers(cells))
         self._comma = has_decimal_commas(chain.from_iterable(texts))

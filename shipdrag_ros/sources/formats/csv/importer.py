@@ -273,7 +273,7 @@ class _RowSamples:
             understood=self._understood(log),
             notes=tuple(self._notes(written, too_fast)),
             not_used=tuple(
-                name for place, name in enumerate(table.header or ()) if place not in used
+                table.key(place) for place in range(len(table.header or ())) if place not in used
             ),
         )
 

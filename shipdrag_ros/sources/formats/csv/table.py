@@ -521,6 +521,13 @@ class LogTable:
         """
         return [self.column(name) for name in names]
 
+    def key(self, place: int) -> str:
+        """
+        Return what `column` finds a column by: its name, or its number where that is not its own.
+        """
+        name, _ = self.about(place)
+        return name if (self.header or ()).count(name) == 1 else str(place + 1)
+
     def about(self, place: int) -> tuple[str, str]:
         """
         Return the name of a column and the unit in the line below it; '' where none is there.
