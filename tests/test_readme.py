@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import figures
+
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / 'README.md').read_text(encoding='utf-8')
 FILES = sorted(set(re.findall(r'(?:benchmarks|docs|config)/[\w./-]+\w', TEXT)))
@@ -41,3 +43,12 @@ def test_opens_with_the_two_commands() -> None:
 @pytest.mark.parametrize('path', FILES)
 def test_every_file_it_names_exists(path: str) -> None:
     assert (ROOT / path).exists()
+
+
+def test_its_figures_are_those_of_the_results() -> None:
+    trend = (ROOT / 'docs' / 'results' / 'trend.txt').read_text(encoding='utf-8')
+    (ships,) = re.findall(r'trend_score --ships (\d+)', trend)
+    (found,) = re.findall(r'one cleaning of 5 % that nobody noted.*?\| (\d+) %', trend)
+    assert f'{int(ships) * int(found) // 100} of {ships} simulated ships' in TEXT
+    # each figure stands once, as its file has it
+    assert figures.page() == figures.PAGE.read_text(encoding='utf-8'), 'benchmarks.figures'
