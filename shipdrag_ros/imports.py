@@ -34,7 +34,7 @@ EXTRA_OF = {
 """Module -> the extra of this package that installs it."""
 LEFT_OUT: dict[EntryPoint, str] = {}
 """What other packages declare and was left out, and why."""
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(os.path.abspath(__file__)).parent
 _OF_ROS = ('_msgs', '_srvs', '_interfaces')
 
 
@@ -142,7 +142,7 @@ def load(
             if not isinstance(declared, kind) or getattr(declared, key) in {*taken, *found}:
                 what = f'{declared!r:.80}, expected {kind.__name__} with a name that is not taken'
                 raise TypeError(what)
-        except Exception as error:  # whatever the code of a stranger does
+        except (Exception, SystemExit) as error:  # whatever the code of a stranger does
             if point.dist is None:
                 raise
             why = f'{point.name!r} ({point.value}) of {point.group} is left out: {error}'

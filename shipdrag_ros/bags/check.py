@@ -23,6 +23,7 @@ from shipdrag_ros.bags.contents import DECLARED, INDEXES, FileSummary, key_of
 from shipdrag_ros.bags.mcap_file import locate, not_mcap
 from shipdrag_ros.bags.records import MAGIC, Buffer, Damage, DamageKind, DamageList, OpenChunk
 from shipdrag_ros.bags.recover import opened
+from shipdrag_ros.display import printable
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Int64
@@ -306,7 +307,7 @@ def _difference(stated: Any, actual: Any) -> str:
         elif one != other:
             shown = name if isinstance(one, bytes) else f'{name} {one}, in the data {other}'
             said.append(shown)
-    return '; '.join(said)
+    return printable('; '.join(said))
 
 
 def _name(kind: type) -> str:

@@ -308,7 +308,10 @@ def _answer(output: Output, store: Path, query: str) -> None:
     columns = tuple(answer.column_names)
     rows = [tuple(row) for row in zip(*(column.to_pylist() for column in answer.columns))]
     cells = [tuple(map(_cell, row)) for row in rows]
-    if sum(len(max(each, key=len)) + 2 for each in zip(columns, *cells)) <= output.width:
+    if (
+        not rows
+        or sum(len(max(each, key=len)) + 2 for each in zip(columns, *cells)) <= output.width
+    ):
         output.table(Table(columns, tuple(cells)))
     else:  # the columns do not fit beside each other
         for row in cells:

@@ -219,8 +219,9 @@ class _Judge:
         even = even_from(self._binned.speed, *kept)
         if even is None:
             return ()
-        faster = self._binned.speed[:even] > self._binned.speed[even] / n.EVEN[0]
-        after_s = (np.flatnonzero(faster)[-1] + 1 - self._binned.before) * self._binned.step_s
+        faster = self._binned.speed[kept[0] : even] > self._binned.speed[even] / n.EVEN[0]
+        begin = kept[0] + np.max(1 + np.flatnonzero(faster), initial=0)
+        after_s = (begin - self._binned.before) * self._binned.step_s
         return (
             f'she keeps her speed from {after_s:.0f} s after the start of the window on: if an '
             'engine drives her there, r is too small: let the window end there',

@@ -529,7 +529,7 @@ def test_an_engaged_engine_shows_in_the_shaft_at_once(watch, record, sensors, sh
     )
     coastdown = the_coastdown(watch(block))
     assert coastdown.ended_by is by
-    assert 395.0 <= end_s(coastdown) <= 412.0
+    assert 395.0 <= end_s(coastdown) <= 410.0
 
 
 def test_what_pushes_while_the_shaft_is_seen_to_stand_is_no_glide(watch, record, sensors) -> None:

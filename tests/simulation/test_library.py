@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros import strict_yaml
+from shipdrag_ros import imports, strict_yaml
 from shipdrag_ros.errors import EffectFileError, SimulationError
 from shipdrag_ros.parameter import Parameter, Prior, Shape
 from shipdrag_ros.samples import INPUTS
@@ -130,14 +130,17 @@ def test_a_formula_of_the_library_is_checked_like_a_learnt_one(tmp_path):
 
 
 def test_one_new_module_is_a_new_effect(tmp_path, monkeypatch):
-    (tmp_path / 'ice.py').write_text(
+    effects = tmp_path / 'shipdrag_ros' / 'simulation' / 'effects'
+    effects.mkdir(parents=True)
+    (effects / 'ice.py').write_text(
         'from shipdrag_ros.parameter import Parameter, half_normal\n'
         'from shipdrag_ros.simulation import Action, Effect, Scope\n'
         'EFFECT = Effect(name="ice", scope=Scope.EARTH, formula="F", source="a test", parameters=('
         'Parameter(name="force_n", unit="N", meaning="ice", prior=half_normal(1.0), low=0, '
         'high=1e9),), act=lambda frame, force: Action(resistance=(lambda v: 0 * v + force,)))\n'
     )
-    monkeypatch.setattr(library, '__path__', [*library.__path__, str(tmp_path)])
+    monkeypatch.setattr(library, '__path__', [*library.__path__, str(effects)])
+    monkeypatch.setattr(imports, '_PACKAGE', tmp_path / 'shipdrag_ros')
     monkeypatch.setattr(library, 'LIBRARY', library._every.__wrapped__())
     monkeypatch.delitem(sys.modules, f'{library.__name__}.ice')
     truth = simulate(CARGO, SCENARIO, effects=[parse('ice=1e5')])

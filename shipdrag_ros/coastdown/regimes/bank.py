@@ -223,7 +223,7 @@ def _pushes_or_not(bank: Histories, i: int, setting: BankSetting, now_s: float) 
         return
     if pushed and last.ramp == 0.0:  # by the level as it is known now, not yet
         f.count -= 1
-    elif pushed and now_s - f.since > n.ENGAGE_S[0] * (
+    elif pushed and now_s - f.since > n.ENGAGE_S * (
         setting.pace if f.kind == s.FADING else f.ramp_s / n.LEVEL_RAMP_S[0]
     ):
         last.what, last.ramp = s.GLIDE, now_s - f.since

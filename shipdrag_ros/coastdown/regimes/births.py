@@ -243,16 +243,16 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
             if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
                 _fades(bank, i, setting, now_s, _THIN_EVERY * chance * n.FADES_SHARE, base)
             chance *= 1.0 - n.FADES_SHARE
-    ramps = len(n.LEVEL_RAMP_S) if engaged else len(n.ENGAGE_S)
+    ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     kinds = 1 if claimed else 2  # torque that is held is any power there
     for k in range(len(n.LEVELS)):
         for m in range(kinds * ramps):
             share = chance * n.LEVELS_SHARE[k] / (kinds * ramps)
-            if engaged and m >= kinds and not claimed:  # the begin of a slow ramp is no sharper
+            if m >= kinds and not claimed:  # the begin of a slow ramp is no sharper
                 if bank.clock[0] % _SLOW_EVERY != 0:
                     continue
                 share *= _SLOW_EVERY
-            ramp_s = (n.LEVEL_RAMP_S if engaged else n.ENGAGE_S)[m // kinds] * setting.pace
+            ramp_s = (n.LEVEL_RAMP_S[m // kinds] if engaged else n.ENGAGE_S) * setting.pace
             j = born(bank, i, now_s, share, s.LEVEL, ramp_s)
             if j < 0:
                 continue

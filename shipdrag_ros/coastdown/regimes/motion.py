@@ -447,7 +447,8 @@ def _dragged(
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
             turns = _as_usual(f, nu, u_part, 0.05, 0.45 if scaled else 0.05)
             stops = n.STOPS_TURNING * _normal(nu, 2.0 * n.SHAFT_SD[0])  # or be held by it
-            f.revs += stops / (stops + turns + n.SHAFT_LIES) * (nu / u_part - f.revs)
+            slower = min(nu / u_part - f.revs, 0.0)
+            f.revs += stops / (stops + turns + n.SHAFT_LIES) * slower
             return turns + stops
         if not scaled:
             f.revs = nu / u_part

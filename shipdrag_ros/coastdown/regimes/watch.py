@@ -338,7 +338,8 @@ class RegimeFilter:
             )
             cuts.append(_cut(stop, begin, Dismissal.THRUST, text))
         date = begin if cuts else start
-        return Dated(stop, date, begin, end, self._ended_by(glide), tuple(cuts))
+        said = tuple(cut for cut in cuts if cut.end_ns > cut.start_ns)
+        return Dated(stop, date, begin, end, self._ended_by(glide), said)
 
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
         if glide.after < 0:
