@@ -205,7 +205,7 @@ SHAFT_SD = _grid('SHAFT_SD', (0.015, 0.04), '1', 'its own error, and that of an 
 SHAFT_FIRST_SD = _number('SHAFT_FIRST_SD', 0.12, '1', 'of what a level should have')
 WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.85), '1', 'over u / U: mean, sd, most; 108 glides')
 STOPS_TURNING = _number(
-    'STOPS_TURNING', 0.01, '1', 'of bins: friction holds a screw that windmilled'
+    'STOPS_TURNING', 0.01, '1', 'of bins: friction holds a screw; propulsion 101, 102'
 )
 CREEPS = _number('CREEPS', 0.1, '1', 'revs that give a hundredth of the thrust')
 SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')

@@ -241,9 +241,8 @@ def even_from(speed: Float64, begin: int, end: int) -> int | None:
     """
     part, length = n.EVEN
     ahead = round(float(length) / n.BIN_S)
-    for k in range(
-        begin + 2 * ahead, min(end, len(speed)) - ahead
-    ):  # what comes later is no glide
+    last = min(end, len(speed)) - ahead  # what comes later is no glide
+    for k in range(begin + 2 * ahead, last):
         now = float(np.mean(speed[max(k - 3, 0) : k + 1]))
         if float(np.mean(speed[k + ahead - 3 : k + ahead + 1])) > part * now:
             return k
