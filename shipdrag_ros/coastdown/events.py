@@ -212,22 +212,12 @@ class Regimes:
             found[ended_by] = float(np.max(chance[soon], initial=0.0))
         return found
 
-    def glides_on(self, end_ns: int) -> float:
-        """
-        Return the least probability, soon after the end of a glide, that she glides.
-        """
-        soon = np.flatnonzero(self.time_ns > end_ns)[:_SOON]
-        others = [self.probability[name] for names in _BY_REGIME.values() for name in names]
-        return float(1.0 - np.max(np.sum(others, axis=0)[soon], initial=0.0)) if len(soon) else 0.0
-
     def ended_by(self, said: EndedBy, end_ns: int) -> EndedBy:
         """
         Return what is said to have ended a glide, or the regime that did so more probably.
-
-        None did where she more probably glides on.
         """
         chances = self.ends(end_ns)
-        if said not in chances or self.glides_on(end_ns) > max(chances.values()):
+        if said not in chances:
             return said
         return max(chances, key=lambda each: (chances[each], each is said))
 
@@ -317,10 +307,6 @@ class EndedCoastdown:
     @property
     def why(self) -> str:
         """What ended it, a clause."""
-        if self.ended_by is EndedBy.ENGINE and self.regimes is not None:
-            on = self.regimes.glides_on(self.end_ns)
-            if on > self.regimes.ends(self.end_ns)[EndedBy.ENGINE]:
-                return f'the ship slowed no more, gliding with P {on:.2f}'
         return ENDED_BY[self.ended_by]
 
     @property

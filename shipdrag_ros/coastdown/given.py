@@ -29,7 +29,7 @@ from shipdrag_ros.coastdown.regimes.given import (
     read,
     shaft_revs,
 )
-from shipdrag_ros.coastdown.regimes.read_out import even_from, stretches
+from shipdrag_ros.coastdown.regimes.read_out import stretches
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
@@ -192,7 +192,7 @@ class _Judge:
             by = f'by {math.degrees(swing):.0f} degrees' if swing < np.inf else 'by her rudder'
             notes = (f'she turns {by}: the drag of drifting and turning is part of r',)
         shown = self._shown() if cuts else ()
-        notes += self._keeps_on(glide) + self._turns_on(glide)
+        notes += self._turns_on(glide)
         return GivenPart(start_ns, end_ns, tuple(cuts), notes=notes, stretch=shown)
 
     def _stood(self, place: float, drives: int) -> float:
@@ -213,19 +213,6 @@ class _Judge:
             if len(at) and driving[0] and not driving[-1]:
                 found.append(at[np.flatnonzero(driving)[-1] + (drives < 0)])
         return float(max(found) if drives < 0 else min(found)) if found else place
-
-    def _keeps_on(self, kept: _SPAN) -> tuple[str, ...]:
-        """Say from when on she keeps her speed."""
-        even = even_from(self._binned.speed, *kept)
-        if even is None:
-            return ()
-        faster = self._binned.speed[kept[0] : even] > self._binned.speed[even] / n.EVEN[0]
-        begin = kept[0] + np.max(1 + np.flatnonzero(faster), initial=0)
-        after_s = (begin - self._binned.before) * self._binned.step_s
-        return (
-            f'she keeps her speed from {after_s:.0f} s after the start of the window on: if an '
-            'engine drives her there, r is too small: let the window end there',
-        )
 
     def _turns_on(self, kept: _SPAN) -> tuple[str, ...]:
         """Say that a shaft turns faster than water turns it, and is taken not to drive her."""

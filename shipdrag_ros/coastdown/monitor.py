@@ -518,8 +518,6 @@ class Monitor:
         self._dismissed_s = (end_ns if was is None else was.end_ns) / SECOND_NS
         events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
         self._running = None
-        if ended_by is EndedBy.SPEED:  # noise begins no other glide, as in `_end`
-            self._reported_s = float(regimes.taken_s)
         self._watch.update_ns = ALWAYS
         return events
 
@@ -537,9 +535,6 @@ class Monitor:
         events = self._running.end(dated, ended_by, regimes.regimes(), self._final_estimator)
         self._running, self._reported_s = None, dated.end_s
         self._ended_by = dated.ended_by or ended_by
-        # noise of the speed begins no other glide of a ship that was too slow
-        if self._ended_by is EndedBy.SPEED:
-            self._reported_s = max(dated.end_s, float(regimes.taken_s))
         self._watch.update_ns = ALWAYS
         return events
 

@@ -208,6 +208,13 @@ def _range_notes(estimate: Estimate) -> list[str]:
             f'Nothing is said outside {low} to {high} m/s; the fit ends at {top} m/s'
             f'{_fastest_reading(estimate, fastest)}.'
         )
+        told = np.flatnonzero(curve.resistance_m_s2 > 2.0 * curve.sigma_m_s2)
+        if not len(told) or told[0] > 0:
+            up_to = curve.speed_m_s[told[0] if len(told) else -1]
+            found.append(
+                f'Up to {speed_text(float(up_to), highest_m_s=fastest)} m/s r(v) is not told '
+                'from zero: too little is read, or an engine or the wind keeps her speed.'
+            )
     found.append(
         f'The upper end, Fr {estimate.froude_valid[1]:.3f}, is '
         f'{FROUDE_MAX_BY[estimate.froude_max_by]}.'

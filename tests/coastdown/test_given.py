@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown.events import Dismissal
-from shipdrag_ros.coastdown.given import GivenPart, judge
-from shipdrag_ros.estimation import Window
+from shipdrag_ros.coastdown.given import GivenPart, estimate_given, judge
+from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.estimation.words import notes
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -151,11 +152,12 @@ def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives(pitc
     assert 'the shaft turns' in found.failure
 
 
-@pytest.mark.parametrize('level', [0.5, 0.8])
-def test_a_level_that_only_the_claim_makes_a_glide_is_told(level: float) -> None:
-    found = judged(block(LOG, noisy(slowed(np.full(len(TIME_S), level)))))
-    assert any(note.startswith('she keeps her speed from ') for note in found.notes)
-    assert judged(block(LOG, noisy(glide(TIME_S)))).notes == ()
+@pytest.mark.parametrize(('level', 'told'), [(0.0, False), (0.5, True), (0.8, True)])
+def test_a_level_that_only_the_claim_makes_a_glide_is_told(level: float, told: bool) -> None:
+    read = window(block(LOG, noisy(slowed(np.full(len(TIME_S), level)))))
+    found = estimate_given(read, BOAT, Parameters(), estimate_final)
+    assert found.estimate is not None
+    assert any('is not told from zero' in note for note in notes(found.estimate)) == told
 
 
 def test_power_taken_back_in_steps_is_no_coastdown() -> None:

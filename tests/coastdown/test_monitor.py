@@ -372,22 +372,6 @@ def test_noise_of_positions_begins_no_other_of_a_ship_that_is_too_slow(
     assert (row.found, row.why) == (True, '')
 
 
-def test_what_was_withdrawn_as_she_became_too_slow_is_announced_once() -> None:
-    # a workboat in moderate seas, seed 4: three times more without
-    (case,) = [
-        each
-        for each in stops(4)
-        if (each.kind, each.hull) == ('declutched, shaft locked', 'workboat')
-    ]
-    world = build(case)
-    monitor = Monitor(world.ship, Parameters(), estimate=refuse, final=refuse)
-    block = in_arrival_order(inputs(world, SUITES['both']))
-    events = [*monitor.update(block), *monitor.finish()]
-    assert (EndedBy.SPEED, True) in [(each.ended_by, each.withdrawn) for each in ended(events)]
-    starts = [each.start_ns for each in of(Onset, events)]
-    assert len(starts) == len(set(starts)) == 2
-
-
 @pytest.mark.parametrize(
     ('second', 'rate_rad_s'), [('compass', 0.02), ('compass', -0.005), ('radar', 0.02)]
 )

@@ -3,8 +3,8 @@
 Every number of the regimes: priors, hazards, shares, and what a decision costs.
 
 One table, so that a vessel which behaves otherwise changes a prior here and nothing
-else. A craft shorter than `CRAFT_M` has bins shorter than `BIN_S`; `SHORTEST_S` and `EVEN`
-shrink with them, in a window that a person claims all times but the hazards.
+else. A craft shorter than `CRAFT_M` has bins shorter than `BIN_S`; `SHORTEST_S`
+shrinks with them, in a window that a person claims all times but the hazards.
 """
 
 from __future__ import annotations
@@ -219,7 +219,6 @@ ANNOUNCE = _grid(
 )
 HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
-EVEN = _grid('EVEN', (0.98, 120.0), '1, s', 'a ship that keeps so much so long glides no more')
 
 EXPLAINED_SHARE = _grid(
     'EXPLAINED_SHARE', (0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0), '1', 'of the records learnt on'

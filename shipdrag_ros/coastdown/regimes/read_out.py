@@ -39,8 +39,7 @@ class SmoothedGlide(NamedTuple):
     begin_sd_s
         Standard deviation of `begin_s`.
     before, after
-        Regime that it follows, and that follows it; -1 where none does, a glide where she kept
-        her speed.
+        Regime that it follows, and that follows it; -1 where none does.
     """
 
     before_s: float
@@ -164,19 +163,12 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
     return dict(zip(OUT, share, strict=True))
 
 
-def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedGlide]:
+def glides(found: Spans, setting: BankSetting, bins: int) -> list[SmoothedGlide]:
     """
-    Read the coastdowns out of all histories.
-
-    Parameters
-    ----------
-    found
-        From `spans_of`.
-    speed : (bins,)
-        Mean speed in each bin [m/s]: a ship that keeps it glides no more.
+    Read the coastdowns in so many bins out of all histories, as `spans_of` gives them.
     """
     found, step_s = found.part(found.what == s.GLIDE), setting.step_s
-    likely = probability_of(found._replace(begin_s=found.gone_s), len(speed), step_s)
+    likely = probability_of(found._replace(begin_s=found.gone_s), bins, step_s)
     all_of: list[SmoothedGlide] = []
     for first, last in stretches(likely > n.HOLD[0]):
         peak = float(likely[first:last].max())
@@ -190,10 +182,6 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
         # one that was not over at a doubt goes on after it
         if all_of and min(glide.begin_s, first * step_s) < all_of[-1].end_s:
             continue
-        begin, end = (round(each / step_s) for each in (glide.begin_s, glide.end_s))
-        even = even_from(speed, begin, end)
-        if even is not None:
-            glide = glide._replace(end_s=even * step_s, after=s.GLIDE)
         if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.step_s / n.BIN_S:
             all_of.append(glide)
     return all_of
@@ -233,20 +221,6 @@ def median(value: Float64, share: Float64) -> float:
     order = np.argsort(value, kind='stable')
     place = np.searchsorted(np.cumsum(share[order]), 0.5)
     return float(value[order[min(int(place), len(order) - 1)]])
-
-
-def even_from(speed: Float64, begin: int, end: int) -> int | None:
-    """
-    Return the bin from which she keeps her speed, between two bins; None where she does not.
-    """
-    part, length = n.EVEN
-    ahead = round(float(length) / n.BIN_S)
-    last = min(end, len(speed)) - ahead  # what comes later is no glide
-    for k in range(begin + 2 * ahead, last):
-        now = float(np.mean(speed[max(k - 3, 0) : k + 1]))
-        if float(np.mean(speed[k + ahead - 3 : k + ahead + 1])) > part * now:
-            return k
-    return None
 
 
 def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float, float]]:

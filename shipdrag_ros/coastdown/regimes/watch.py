@@ -55,7 +55,6 @@ _FIXES = 2.0  # in a bin: a way is from one to the next
 
 _ENDED = {
     s.LEVEL: EndedBy.ENGINE,
-    s.GLIDE: EndedBy.ENGINE,
     s.AMID: EndedBy.ENGINE,
     s.BRAKE: EndedBy.BRAKE,
     s.TURN: EndedBy.TURN,
@@ -310,7 +309,7 @@ class RegimeFilter:
         None claims anything of the time before the end of the last, or before what was told.
         """
         found = list[Dated]()
-        for each in glides(self._spans, self._setting, self._speed):
+        for each in glides(self._spans, self._setting, len(self._out)):
             found.append(self._dated(each, since_s))
             since_s = max(since_s, found[-1].end_s)
         return found
