@@ -10,7 +10,6 @@ import pytest
 
 from benchmarks.worlds.propulsion.cases import stops
 from benchmarks.worlds.propulsion.score import SUITES, score
-from benchmarks.worlds.propulsion.world import build, inputs
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
     Dismissal,
