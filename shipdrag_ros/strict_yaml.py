@@ -13,6 +13,7 @@ import re
 from io import StringIO
 from typing import Any
 
+import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import (
@@ -174,6 +175,7 @@ class _Representer(SafeRepresenter):
 
 
 _Representer.add_representer(str, _Representer.represent_text)
+_Representer.add_multi_representer(np.generic, lambda to, each: to.represent_data(each.item()))
 
 
 def dump(data: Any) -> str:

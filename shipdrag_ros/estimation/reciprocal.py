@@ -7,6 +7,8 @@ current, does not: the runs show both, and by its posterior r of each follows
 its current. Where no run finds one, it is that under which the curves of runs
 over ground agree, their speeds shifted by it. What still differs from run to run (wind, waves,
 a current that changes) widens the band.
+
+All are in calm deep water: the weather of one run is not that of another.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ _LARGEST_CURRENT = 0.4  # of the lowest speed
 @dataclass(frozen=True)
 class Combined(ForceCurve):
     """
-    r(v) from several coastdowns, inside the valid range of every run.
+    r(v) in calm deep water from several coastdowns, inside the valid range of every run.
 
     The mean is weighted by the repeatable variances; the repeatable sigma is widened where the
     runs differ by more than it says.
@@ -86,7 +88,7 @@ def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None])
     less, current, current_sigma = _currents(estimates, heading)
     curves = [
         replace(each, resistance_m_s2=each.resistance_m_s2 + more * each.by_current_1_s)
-        for each, more in zip(comparable(estimates), less)
+        for each, more in zip([one.valid_calm for one in estimates], less)
     ]
     if current is None and over_ground.any():
         current, current_sigma = _agreement(curves, over_ground, along)
@@ -95,24 +97,6 @@ def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None])
         shifts = np.where(over_ground, current * np.nan_to_num(along), 0.0)
     shared = [_shared(*each) for each in zip(estimates, curves)]
     return _mean(curves, shared, shifts, current, current_sigma)
-
-
-def comparable(estimates: Sequence[Estimate]) -> list[ResistanceCurve]:
-    """
-    Return r(v) of runs inside their valid ranges, of one kind.
-
-    Parameters
-    ----------
-    estimates
-
-    Returns
-    -------
-    list of ResistanceCurve
-        In calm deep water where wind and depth of all are known, else all in the conditions of
-        their runs.
-    """
-    unknown = any(each.reference.unknown for each in estimates)
-    return [each.valid_conditions if unknown else each.valid_calm for each in estimates]
 
 
 def _currents(

@@ -22,7 +22,7 @@ from shipdrag_ros.coastdown.events import NotCoastdown
 from shipdrag_ros.display import Table, ship_speed, short_repr, utc
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
-from shipdrag_ros.estimation.reciprocal import Combined, combine, comparable
+from shipdrag_ros.estimation.reciprocal import Combined, combine
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve, froude_max
 from shipdrag_ros.replay import ReplayResult
 from shipdrag_ros.replay.coasts import why_no_coastdown
@@ -370,22 +370,21 @@ def of_one_ship(runs: Sequence[RunResult]) -> bool:
 
 def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
     """Say that campaigns differ, by how much; '' where one state of the hull fits all."""
-    campaigns: list[list[tuple[Estimate, ResistanceCurve]]] = []
-    usable = [each for each in estimates if len(each.valid_curve)]
-    curves = comparable(usable)
-    for each in sorted(zip(usable, curves, strict=True), key=lambda one: one[0].start_ns):
-        if campaigns and each[0].start_ns - campaigns[-1][-1][0].end_ns < _CAMPAIGN_NS:
+    campaigns: list[list[Estimate]] = []
+    usable = [each for each in estimates if len(each.valid_calm)]
+    for each in sorted(usable, key=lambda one: one.start_ns):
+        if campaigns and each.start_ns - campaigns[-1][-1].end_ns < _CAMPAIGN_NS:
             campaigns[-1].append(each)
         else:
             campaigns.append([each])
     if len(campaigns) < 2:
         return ''
-    low = max(curve.speed_m_s[0] for curve in curves)
-    high = min(curve.speed_m_s[-1] for curve in curves)
+    low = max(each.valid_calm.speed_m_s[0] for each in usable)
+    high = min(each.valid_calm.speed_m_s[-1] for each in usable)
     if low > high:
         return ''  # no speed in common: `combine` says so
     speed = float(np.clip(usual_speed_m_s(usable, ship), low, high))
-    means = [_mean([curve for _, curve in campaign], speed) for campaign in campaigns]
+    means = [_mean([each.valid_calm for each in campaign], speed) for campaign in campaigns]
     far = max(
         abs(one[0] - other[0]) / np.hypot(one[1], other[1])
         for one, other in combinations(means, 2)
@@ -398,8 +397,8 @@ def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
         r = [mean[0] for mean in means]
         shown = [campaigns[int(np.argmin(r))], campaigns[int(np.argmax(r))]]
         of_many = f'of {len(campaigns)} dates the least and the most: '
-    for (first, curve), *_ in shown:
-        force = Force.of(curve, ship)
+    for first, *_ in shown:
+        force = Force.of(first.valid_calm, ship)
         _, resistance, _, over = force.cells(force.near(speed))
         parts.append(f'{utc(first.start_ns)[:10]}: {", ".join(filter(None, (resistance, over)))}')
     return (

@@ -174,6 +174,7 @@ def combined_notes(combined: Combined) -> tuple[str, ...]:
             'deviations); it is taken out.'
         )
     return (
+        'It is of the ship in calm deep water: what each run shows of its wind and depth is out.',
         current,
         'Run to run is the standard deviation of one run about the mean of all; where it is '
         'larger than the runs themselves state, sigma is widened.',

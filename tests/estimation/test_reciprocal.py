@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -13,9 +14,11 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.library.record import estimate as of
+from shipdrag_ros.library.simulated import simulate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.samples import Channel
+from shipdrag_ros.ship import Ship
 
 
 def run(
@@ -48,8 +51,7 @@ def test_current_and_offset_are_taken_out(coast, ship, log: bool, offset_m_s: fl
 
 def test_runs_that_differ_widen_the_band(coast, ship) -> None:
     one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
-    larger = replace(one.curve, resistance_m_s2=1.2 * one.curve.resistance_m_s2)
-    more = replace(one, conditions=larger)
+    more = replace(one, calm=replace(one.calm, resistance_m_s2=1.2 * one.calm.resistance_m_s2))
     alike = combine([one, one], [0.0, 0.0])
     apart = combine([one, more], [0.0, 0.0])
     np.testing.assert_allclose(alike.scatter_m_s2, 0.0, atol=1e-15)
@@ -59,7 +61,7 @@ def test_runs_that_differ_widen_the_band(coast, ship) -> None:
     )
     # the error of n_r is common to all runs and does not average out
     of_n_r = alike.sigma_m_s2**2 - alike.sigma_repeatable_m_s2**2
-    expected = one.valid_curve.sigma_m_s2**2 - one.valid_curve.sigma_repeatable_m_s2**2
+    expected = one.valid_calm.sigma_m_s2**2 - one.valid_calm.sigma_repeatable_m_s2**2
     np.testing.assert_allclose(of_n_r.max(), expected.max(), rtol=1e-6)
 
 
@@ -67,30 +69,27 @@ def test_what_runs_share_does_not_average_out(coast, ship) -> None:
     # the scale of her log, and what the file says of her curve, are the same in every run
     one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
     eight = combine([one] * 8, [None] * 8)
-    alone = one.valid_curve.sigma_repeatable_m_s2
+    alone = one.valid_calm.sigma_repeatable_m_s2
     shared = np.minimum(one.sigma_shared_m_s2, alone)
     own = np.sqrt(alone**2 - shared**2)
     expected = np.sqrt(shared**2 + own**2 / 8.0)
-    at = eight.speed_m_s, one.valid_curve.speed_m_s
+    at = eight.speed_m_s, one.valid_calm.speed_m_s
     np.testing.assert_allclose(eight.sigma_repeatable_m_s2, np.interp(*at, expected), rtol=0.03)
     log_alone = replace(one, sigma_shared_m_s2=alone.copy())
     held = combine([log_alone] * 8, [None] * 8)
     np.testing.assert_allclose(held.sigma_repeatable_m_s2, np.interp(*at, alone), rtol=0.02)
 
 
-def test_runs_are_of_one_kind(coast, ship) -> None:
-    # wind and depth are known of one alone: what it is in calm deep water is not that of the other
-    one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
-    assert one.reference.unknown
-    less = replace(one.calm, resistance_m_s2=0.9 * one.conditions.resistance_m_s2)
-    known = replace(one, calm=less, reference=Reference(Knowledge.MEASURED, Knowledge.STATED))
-    assert not known.reference.unknown
-    mixed = combine([one, known], [0.0, 0.0])
-    np.testing.assert_array_equal(
-        mixed.resistance_m_s2, combine([one, one], [0.0, 0.0]).resistance_m_s2
-    )
-    calm = combine([known, known], [0.0, 0.0])
-    np.testing.assert_allclose(calm.resistance_m_s2, 0.9 * mixed.resistance_m_s2, rtol=1e-4)
+def test_wind_that_is_measured_is_out_of_the_mean_though_the_depth_is_not_known() -> None:
+    ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+    wind = {'head_m_s': 6.0, 'cross_m_s': 0.0}
+    inputs = ('speed_through_water', 'wind_apparent')
+    runs = [simulate(ship, {'wind': wind}, seed=seed, inputs=inputs) for seed in range(2)]
+    found = [of(each).coastdowns[0].event.estimate for each in runs]
+    assert all(each.reference.unknown == ('depth',) for each in found)
+    both = combine(found, [0.0, 0.0])
+    clean = ship.resistance_n(both.speed_m_s) / ship.mass_kg
+    np.testing.assert_allclose(both.resistance_m_s2, clean, rtol=0.03)
 
 
 def test_no_heading_no_current(coast, ship) -> None:

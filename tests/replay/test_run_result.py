@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
-from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.replay.run_result import RunResult, TrueCurve, rank, together
 from shipdrag_ros.ship import Fact, RunSheet
 from shipdrag_ros.ship.model import RunWater
@@ -67,9 +66,7 @@ def later(run: RunResult, *, days: float, factor: float, bag: str = 'later.mcap'
         estimate,
         start_ns=estimate.start_ns + shift,
         end_ns=estimate.end_ns + shift,
-        conditions=replace(
-            estimate.curve, resistance_m_s2=factor * estimate.curve.resistance_m_s2
-        ),
+        calm=replace(estimate.calm, resistance_m_s2=factor * estimate.calm.resistance_m_s2),
     )
     start, end = coastdown.start_ns + shift, coastdown.end_ns + shift
     there = replace(coastdown, start_ns=start, end_ns=end, estimate=moved)
@@ -105,25 +102,6 @@ def test_months_later_the_same_resistance_is_the_same_state(run: RunResult) -> N
     found = together([run, later(run, days=90.0, factor=1.05)])
     assert found.combined is not None
     assert found.combined.runs == 2
-
-
-def test_campaigns_are_compared_in_the_same_conditions(run: RunResult) -> None:
-    # of one of them wind and depth are known: in calm water it has less resistance, as all have
-    known = later(run, days=90.0, factor=1.0)
-    (coastdown,) = known.coastdowns
-    assert coastdown.estimate is not None
-    calm = coastdown.estimate.conditions
-    measured = replace(
-        coastdown.estimate,
-        calm=replace(calm, resistance_m_s2=0.7 * calm.resistance_m_s2),
-        reference=Reference(Knowledge.MEASURED, Knowledge.MEASURED),
-    )
-    there = replace(known, coastdowns=(replace(coastdown, estimate=measured),))
-    found = together([run, there])
-    assert found.combined is not None
-    alike = together([run, known]).combined
-    assert alike is not None
-    np.testing.assert_array_equal(found.combined.resistance_m_s2, alike.resistance_m_s2)
 
 
 def test_runs_of_one_day_show_wind_and_sea(run: RunResult) -> None:
