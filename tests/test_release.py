@@ -165,6 +165,17 @@ def test_no_other_version_is_dated_than_the_one_that_is_tagged_next() -> None:
     assert {f'v{each}' for each in dated} <= {*tags, f'v{shipdrag_ros.__version__}'}
 
 
+def test_a_change_is_one_line_under_the_user_who_notices_it() -> None:
+    text = (ROOT / 'CHANGELOG.md').read_text(encoding='utf-8').partition('\n## [0.2.0]')[0]
+    _, *lines = text.partition('\n## [')[2].splitlines()
+    users = 'Aboard|Office|At the desk|Library and formats|ROS, installation and packaging'
+    heading = re.compile(rf'### ({users})( \(.+\))?')
+    entry = re.compile(r'- (Added|Changed|Fixed|Removed): .{1,160}\.')
+    first = next(at for at, line in enumerate(lines) if heading.fullmatch(line))
+    rest = [line for line in lines[first:] if line and not heading.fullmatch(line)]
+    assert [line for line in rest if not entry.fullmatch(line)] == []
+
+
 def test_checksums_are_of_all_that_is_released(tmp_path: Path) -> None:
     text = (ROOT / '.github' / 'workflows' / 'release.yml').read_text(encoding='utf-8')
     (job,) = yaml.safe_load(text)['jobs'].values()
