@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """YAML without its traps."""
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -53,6 +54,7 @@ def test_repeated_keys_are_reported_with_their_lines():
         | st.booleans()
         | st.integers()
         | st.floats(allow_nan=False)
+        | st.floats(allow_nan=False).map(np.float64)
         | st.text(max_size=12),
         lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner),
         max_leaves=6,
