@@ -241,9 +241,7 @@ def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float
 
 def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSpeed | None:
     """
-    Return in what she lost most of her speed from a bin to the slowest.
-
-    A glide only where that is likelier throughout than all else. None where she lost none.
+    Return in what she lost most of her speed from a bin to the slowest; None where she lost none.
     """
     last = first + int(np.argmin(speed[first:])) + 1
     lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
@@ -253,9 +251,7 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSp
     losses = [
         probability_of(found.part(part), len(speed), step_s)[first:last] * lost for part in parts
     ]
-    glided = probability_of(found.part(found.what == s.GLIDE), len(speed), step_s)[first:last]
-    most = int(np.argmax([loss.sum() for loss in losses[:-1]]))
-    best = len(codes) - 1 if glided.min() > _LIKELY else most
+    best = int(np.argmax([loss.sum() for loss in losses]))
     if not losses[best].sum() > 0.0:
         return None
     share, part = (found.weight * shared)[parts[best]], found.part(parts[best])
