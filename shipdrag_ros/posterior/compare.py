@@ -242,7 +242,7 @@ class Comparing:
     kept
         Further ways, of effects that are as an earlier diagnosis found them.
     may_differ
-        Effects that, where they are of the hull, may have another size in each run.
+        Effects that may have another size in each run, but for those that act in one alone.
     """
 
     def __init__(
@@ -255,7 +255,7 @@ class Comparing:
         may_differ: Sequence[Effect] = (),
     ) -> None:
         self.runs, self.effects, self.log_known = runs, tuple(effects), log_known
-        self.may_differ = tuple(each for each in may_differ if each.scope is Scope.HULL)
+        self.may_differ = tuple(each for each in may_differ if each.scope is not Scope.RUN)
         self.stated = tuple(stated_way(each, ship) for each in checked(ship).effects)
         self.base = Explanation(self.stated)
         self.noise: list[_RunNoise] = []
@@ -752,17 +752,20 @@ class Comparing:
         return list(kept.values())[:_PAIRS]
 
     def _differing(self, fits: Sequence[Fitted]) -> list[Fitted]:
-        """Return effects of the hull with a size for each run: how one fits all tells nothing."""
+        """Return effects with a size for each run: how one fits all tells nothing."""
         count = len(self.runs.runs)
         if count < 2:
             return []
         best = ComparedHypotheses(self.effects, tuple(fits)).best
-        odds = (priors.DIFFERS_LATER if self.runs.apart else priors.DIFFERS).mean
+        apart = self.runs.apart
+        odds = (priors.DIFFERS_LATER if apart else priors.DIFFERS).mean
         found = []
         for alike in (best[e.name,] for e in self.may_differ if (e.name,) in best):
             *stated, way = alike.hypothesis.ways
             own = [replace(way, run=j, log_odds=0.0) for j in range(count)]
-            own[0] = replace(own[0], log_odds=way.log_odds + math.log(odds))
+            # of another day the weather is another
+            less = 0.0 if apart and way.effect.scope is Scope.EARTH else math.log(odds)
+            own[0] = replace(own[0], log_odds=way.log_odds + less)
             hypothesis = Explanation((*stated, *own))
             at, first, q = self.widened(self.nothing, hypothesis), self.first, len(way.unknowns)
             at[first : first + count * q] = np.tile(alike.at[first : first + q], count)
