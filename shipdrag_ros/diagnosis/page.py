@@ -238,14 +238,14 @@ def write_diagnosis(
 
 def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
     """Show the verdict, what the ship needs, and what would decide."""
-    sentence, *rest = found.summary()
+    sentence, *rest = words.summary(found)
     answers = words.answers(found)
     caption = (
         'How probable each answer is. One long bar is a name; several of like length are '
         'what these runs cannot separate.'
     )
     yield Section(
-        lead=[sentence, *found.needs(ship)[:1]],
+        lead=[sentence, *words.needs(found, ship)[:1]],
         text=rest,
         pictures=[picture(probability_picture(answers), caption)] if answers else (),
     )
