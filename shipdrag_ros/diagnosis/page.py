@@ -91,11 +91,7 @@ def _draw_motion(axis: Axes, compared: Compared, after: str, scale: tuple[float,
 
 
 def draw_difference(
-    axis: Axes,
-    compared: Compared,
-    scale: tuple[float, str],
-    *,
-    labels: tuple[str, str] = ('', ''),
+    axis: Axes, compared: Compared, scale: tuple[float, str], *, labels: tuple[str, str] = ('', '')
 ) -> None:
     """
     Draw measured less model on axes, over the band of the noise.
@@ -199,11 +195,7 @@ _TRUST = (
 )
 
 
-def write_diagnosis(
-    path: Path,
-    found: DiagnosisResult,
-    ship: Ship | None,
-) -> None:
+def write_diagnosis(path: Path, found: DiagnosisResult, ship: Ship | None) -> None:
     """
     Write a diagnosis as one HTML file.
 
@@ -282,10 +274,7 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
         lines=in_service(usable, ship),
         pictures=drawn,
         tables=[
-            (
-                f'{date}: resistance and effective power',
-                estimate_words.force_table(curve, ship),
-            )
+            (f'{date}: resistance and effective power', estimate_words.force_table(curve, ship))
             for date, curve in curves
         ],
     )

@@ -74,7 +74,7 @@ class TrueCurve:
                 'settings': dict(self.settings),
                 'speed_m_s': self.speed_m_s.tolist(),
                 'resistance_m_s2': self.resistance_m_s2.tolist(),
-            },
+            }
         )
 
     @classmethod
