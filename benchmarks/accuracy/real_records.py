@@ -29,7 +29,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.estimation import pictures
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import ReplayResult, replay
+from shipdrag_ros.replay import ReplayResult, replay, words
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.report import drawing
 from shipdrag_ros.samples import Float64
@@ -342,7 +342,7 @@ def draw(out: Path) -> None:
             truth=None if true is None else (true.speed_m_s, true.resistance_m_s2),
         )
         drawing.save(figure, out / f'{name}.png')
-        print(f'picture: {out / name}.png, {coastdown.estimate.summary(result.ship)[0]}')
+        print(f'picture: {out / name}.png, {words.summary(coastdown, result.ship)[0]}')
 
 
 def main() -> None:

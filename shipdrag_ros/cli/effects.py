@@ -128,7 +128,7 @@ def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
 def _show_diagnosis(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     from shipdrag_ros.diagnosis import words
 
-    output.say(*found.summary(ship))
+    output.say(*words.summary(found, ship))
     if found.question:
         return
     output.table(words.probabilities_table(found), 'How probable')

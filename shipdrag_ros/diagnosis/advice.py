@@ -80,8 +80,7 @@ class PredictedOutcome:
         root = axes * np.sqrt(np.maximum(size, 0.0))
         unknown = rng.standard_normal((count, len(root))) @ root.T
         noise = rng.standard_normal((count, len(self.mean)))
-        drawn: Float64 = self.mean + unknown @ self.slope + noise
-        return drawn
+        return np.asarray(self.mean + unknown @ self.slope + noise, np.float64)
 
     def log_density(self, outcomes: Float64) -> Float64:
         """
@@ -95,8 +94,7 @@ class PredictedOutcome:
         before = np.linalg.slogdet(self.precision[np.ix_(known, known)])[1]
         volume = before - np.linalg.slogdet(matrix)[1]
         squares = np.einsum('ai,ai->a', away, away)
-        density: Float64 = 0.5 * (volume - squares + explained)
-        return density
+        return np.asarray(0.5 * (volume - squares + explained), np.float64)
 
 
 def of_another_run(

@@ -156,18 +156,17 @@ def _since_ns(lead: Window) -> int:
 def _speed(lead: Window) -> float:
     """Return the speed of now [m/s]."""
     since_ns = _since_ns(lead)
-    for series in lead.each('speed_through_water', 'speed_over_ground'):
+    for series in lead.each('speed_through_water', 'speed_over_ground', 'position'):
         now = series[int(np.searchsorted(series.time_ns, since_ns)) :]
-        if len(now) >= _LEAST:
+        if len(now) < _LEAST:
+            continue
+        if now.value.ndim == 1:
             return float(np.median(now.value))
-    for series in lead.each('position'):
-        now = series[int(np.searchsorted(series.time_ns, since_ns)) :]
-        if len(now) >= _LEAST:
-            half = len(now) // 2
-            early, late = now[:half], now[half:]
-            way = late.value.mean(axis=0) - early.value.mean(axis=0)
-            time_s = (late.time_ns.mean() - early.time_ns.mean()) / SECOND_NS
-            return float(np.hypot(*way) / time_s)
+        half = len(now) // 2
+        early, late = now[:half], now[half:]
+        way = late.value.mean(axis=0) - early.value.mean(axis=0)
+        time_s = (late.time_ns.mean() - early.time_ns.mean()) / SECOND_NS
+        return float(np.hypot(*way) / time_s)
     raise DiagnosisError(
         f'no input has told the speed {_LEAST} times in the last {_NOW_S / 60.0:.0f} minutes'
     )

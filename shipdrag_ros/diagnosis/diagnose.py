@@ -46,20 +46,10 @@ from shipdrag_ros.errors import (
     ShipdragError,
     SimulationError,
 )
-from shipdrag_ros.inference.decision import (
-    CERTAIN,
-    NONE,
-    UNKNOWN,
-    Verdict,
-    smallest_set,
-)
+from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict, smallest_set
 from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import (
-    Comparing,
-    Fitted,
-    RunResidual,
-)
+from shipdrag_ros.posterior.compare import Comparing, Fitted, RunResidual
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
@@ -69,8 +59,6 @@ from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import carrying, effects_of, terms
 
 _APART_M_S = 0.15  # slowly: six times what is usual of water
-Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
-"""Runs, and what is to be said about them."""
 
 
 def diagnose(
@@ -183,12 +171,7 @@ def diagnose(
 
 
 def _answer(
-    case: DiagnosedRuns,
-    notes: tuple[str, ...],
-    baseline: str,
-    progress: Progress,
-    *,
-    advise: bool,
+    case: DiagnosedRuns, notes: tuple[str, ...], baseline: str, progress: Progress, *, advise: bool
 ) -> DiagnosisResult:
     """Judge what was compared."""
     stated = case.ship.baseline is not None
@@ -283,7 +266,6 @@ def compare(
     earlier
         What earlier diagnoses say of the runs.
     """
-
     before = Carried(ship, 0, ()) if earlier is None else earlier
     effects = effects_about(seen)
 
@@ -331,11 +313,8 @@ def _has_both(run: Observation) -> bool:
 
 
 def observed(
-    runs: Sequence[CoastRun],
-    ship: Ship,
-    parameters: Parameters,
-    progress: Progress,
-) -> Observed:
+    runs: Sequence[CoastRun], ship: Ship, parameters: Parameters, progress: Progress
+) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
     """
     Return the runs that can be diagnosed, and what is to be said about them.
 

@@ -191,9 +191,7 @@ class Facts:
 
 
 def stated_facts(
-    ship: Ship,
-    runs: Sequence[tuple[Sequence[Fact], int]],
-    everywhere: Sequence[Fact] = (),
+    ship: Ship, runs: Sequence[tuple[Sequence[Fact], int]], everywhere: Sequence[Fact] = ()
 ) -> Facts:
     """
     Gather the facts of the ship file, of single runs and of the diagnosis.

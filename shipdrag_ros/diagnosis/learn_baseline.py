@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import softmax
@@ -331,14 +331,10 @@ def stated_sd(ship: Ship) -> Float64:
 def _opened(ship: Ship) -> Ship:
     """Return a ship whose baseline may differ in all its parts, and in retardation alone."""
     assert ship.baseline is not None
-    base = replace(ship.baseline, relative_sd_of='retardation', run_scatter=0.0)
-    if isinstance(base, TableBaseline):
-        sd = max(base.relative_sd, _LEAST_SD)
-        return replace(ship, baseline=replace(base, relative_sd=sd))
-    parts = CoefficientSd(
-        max(base.relative_sd.friction, _LEAST_SD), max(base.relative_sd.wave, _LEAST_SD)
-    )
-    return replace(ship, baseline=replace(base, relative_sd=parts))
+    first, *wave = np.maximum(stated_sd(ship), _LEAST_SD).tolist()
+    sd: Any = CoefficientSd(first, *wave) if wave else first
+    changes = {'relative_sd': sd, 'relative_sd_of': 'retardation', 'run_scatter': 0.0}
+    return replace(ship, baseline=replace(ship.baseline, **changes))
 
 
 ENOUGH = 3  # runs that show their scatter

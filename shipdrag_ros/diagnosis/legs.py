@@ -586,11 +586,6 @@ class StandingLog:
         span = float(self.at_m_s.min()), float(self.at_m_s.max())
         return Where('log', (0.0, self.length_s), span)
 
-    @property
-    def rms_m_s(self) -> float:
-        """Of the speed that the log does not show."""
-        return float(np.sqrt(np.mean(self.at_m_s**2)))
-
 
 def _drifts(way: NDArray[np.complex128], by_place: bool) -> bool:
     """Say whether one velocity of the water may be all that moves the ship."""
@@ -607,5 +602,4 @@ def _log_likelihood(bands: Float64, speed: Float64, zero: NDArray[np.bool_]) -> 
             below = expit((1.0 - speed / bands[:, None]) / width)
             chance = lapse + (1.0 - 2.0 * lapse) * below
             found.append(np.log(np.where(zero, chance, 1.0 - chance)).sum(axis=1))
-    total: Float64 = logsumexp(np.array(found), axis=0) - np.log(len(found))
-    return total
+    return np.asarray(logsumexp(np.array(found), axis=0) - np.log(len(found)), np.float64)

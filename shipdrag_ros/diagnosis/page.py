@@ -91,11 +91,7 @@ def _draw_motion(axis: Axes, compared: Compared, after: str, scale: tuple[float,
 
 
 def draw_difference(
-    axis: Axes,
-    compared: Compared,
-    scale: tuple[float, str],
-    *,
-    labels: tuple[str, str] = ('', ''),
+    axis: Axes, compared: Compared, scale: tuple[float, str], *, labels: tuple[str, str] = ('', '')
 ) -> None:
     """
     Draw measured less model on axes, over the band of the noise.
@@ -199,11 +195,7 @@ _TRUST = (
 )
 
 
-def write_diagnosis(
-    path: Path,
-    found: DiagnosisResult,
-    ship: Ship | None,
-) -> None:
+def write_diagnosis(path: Path, found: DiagnosisResult, ship: Ship | None) -> None:
     """
     Write a diagnosis as one HTML file.
 
@@ -238,14 +230,14 @@ def write_diagnosis(
 
 def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
     """Show the verdict, what the ship needs, and what would decide."""
-    sentence, *rest = found.summary()
+    sentence, *rest = words.summary(found)
     answers = words.answers(found)
     caption = (
         'How probable each answer is. One long bar is a name; several of like length are '
         'what these runs cannot separate.'
     )
     yield Section(
-        lead=[sentence, *found.needs(ship)[:1]],
+        lead=[sentence, *words.needs(found, ship)[:1]],
         text=rest,
         pictures=[picture(probability_picture(answers), caption)] if answers else (),
     )
@@ -282,10 +274,7 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
         lines=in_service(usable, ship),
         pictures=drawn,
         tables=[
-            (
-                f'{date}: resistance and effective power',
-                estimate_words.force_table(curve, ship),
-            )
+            (f'{date}: resistance and effective power', estimate_words.force_table(curve, ship))
             for date, curve in curves
         ],
     )

@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from shipdrag_ros.display import Table, short_repr
+from shipdrag_ros.display import short_repr
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.words import in_service
 from shipdrag_ros.inference.decision import CERTAIN, Verdict, smallest_set
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
@@ -413,42 +412,3 @@ class DiagnosisResult:
         """The smallest set that holds 90 %, most probable first."""
         probability = {each.names: each.probability for each in self.candidates}
         return self.candidates[: len(smallest_set(probability, CERTAIN))]
-
-    def needs(self, ship: Ship | None) -> tuple[str, ...]:
-        """
-        Say what she needs at her usual speed; nothing of a ship that is not known.
-        """
-        if ship is None or self.question:
-            return ()
-        return in_service(self.estimates, self.in_runs or ship)
-
-    def summary(self, ship: Ship | None = None) -> tuple[str, ...]:
-        """
-        Say what was found: that there is no coastdown, the verdict, what was examined, and where.
-
-        Parameters
-        ----------
-        ship
-            With her, also what she needs at her usual speed.
-
-        Returns
-        -------
-        tuple of str
-            A paragraph each; the verdict first, where there is a coastdown.
-        """
-        from shipdrag_ros.diagnosis import words  # it shows what this module holds
-
-        where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
-        first = (self.no_coastdown, words.sentence(self), words.differing(self.runs_differ))
-        last = 'Sizes elsewhere are those of the last run.' if self.runs_differ else ''
-        lines = (*first, last, *self.needs(ship), words.examined(self), where)
-        more = (*words.facts(self), *words.earlier(self), *self.notes)
-        return (*filter(None, lines), *more)
-
-    def table(self) -> Table:
-        """
-        Show how probable each answer is.
-        """
-        from shipdrag_ros.diagnosis import words
-
-        return words.probabilities_table(self)

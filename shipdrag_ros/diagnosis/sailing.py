@@ -293,8 +293,7 @@ class SailingModel:
         splines = bsplines(speed / speed.max(), _SPLINES).T
         line = np.array([np.ones(len(speed)), speed]).T
         bent = splines - line @ np.linalg.lstsq(line, splines, rcond=1e-6)[0]
-        found: Float64 = priors.SMOOTH_SIZES[1] * float(speed.max()) * bent.T
-        return found
+        return np.asarray(priors.SMOOTH_SIZES[1] * float(speed.max()) * bent.T, np.float64)
 
 
 def shown() -> list[Effect]:
@@ -417,7 +416,7 @@ def _zeros_alone(standing: StandingLog, why: str, no_coastdown: str) -> Diagnosi
     judged = judge(found, ())
     return judged.result(
         where=standing.where if judged.missing else None,
-        before=Gap(standing.rms_m_s, None, math.nan),
+        before=Gap(float(np.sqrt(np.mean(standing.at_m_s**2))), None, math.nan),
         baseline='none',
         notes=(standing.note, f'nothing else between log and track was examined: {why}'),
         examined=(LOG_TRACK,),

@@ -349,11 +349,13 @@ def _points(way: EffectWay) -> Float64:
 
 def _rival(modes: Sequence[EffectWay], lines: _Lines, nothing: int) -> Rival:
     """Return an effect as a rival of others, its lines kept."""
-    stated, parts = lines.comparing.stated, []
+    comparing, stated, parts = lines.comparing, lines.comparing.stated, []
     for way in modes:
         z = _points(way)
         sized = [replace(way, start=(one, *way.start[1:])) for one in z.tolist()]
-        shown = _traces(lines.comparing, [Explanation((*stated, each)) for each in sized])
+        tried = [Explanation((*stated, each)) for each in sized]
+        runs = range(len(comparing.runs.runs))
+        shown = [comparing.traces(j, comparing.nothing, tried) for j in runs]
         slopes = lines.add([_CELL * np.gradient(each[1:], _CELL, axis=0) for each in shown])
         log_chance = np.append(-math.inf, -0.5 * z[1:] ** 2 / (1.0 - _CELL**2))
         parts.append(
@@ -366,11 +368,6 @@ def _rival(modes: Sequence[EffectWay], lines: _Lines, nothing: int) -> Rival:
             )
         )
     return Rival(math.log(modes[0].effect.odds), *map(np.concatenate, zip(*parts, strict=True)))
-
-
-def _traces(comparing: Comparing, hypotheses: Sequence[Explanation]) -> list[Float64]:
-    runs = range(len(comparing.runs.runs))
-    return [comparing.traces(j, comparing.nothing, hypotheses) for j in runs]
 
 
 def percent_of_r(comparing: Comparing, name: str, bound: float) -> float:
@@ -519,12 +516,7 @@ def _given_shared(
 
 
 def where(
-    case: ComparedRuns,
-    before: Fitted,
-    after: Fitted,
-    named: Collection[str],
-    *,
-    of_force: bool,
+    case: ComparedRuns, before: Fitted, after: Fitted, named: Collection[str], *, of_force: bool
 ) -> Where:
     """
     Return in which channel, and when, model and data disagree.

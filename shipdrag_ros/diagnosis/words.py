@@ -22,6 +22,7 @@ from shipdrag_ros.diagnosis.result import (
     WeighedEarlier,
 )
 from shipdrag_ros.display import M_S_PER_KNOT, TRACK_LABELS, Table, plus_minus, utc
+from shipdrag_ros.estimation.words import in_service
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
@@ -41,6 +42,37 @@ _ANY_HULL = ' What is named of the hull here is against a usual hull, clean or n
 _LEAST = 0.001  # probability that is stated
 _MOST_LIMITS = 5
 _LARGE_N = 1e4  # from here on a force is stated in kN
+
+
+def summary(found: DiagnosisResult, ship: Ship | None = None) -> tuple[str, ...]:
+    """
+    Say what was found: that there is no coastdown, the verdict, what was examined, and where.
+
+    Parameters
+    ----------
+    found
+    ship
+        With her, also what she needs at her usual speed.
+
+    Returns
+    -------
+    tuple of str
+        A paragraph each; the verdict first, where there is a coastdown.
+    """
+    where = '' if found.where is None else f'Model and data disagree {place(found)}.'
+    first = (found.no_coastdown, sentence(found), differing(found.runs_differ))
+    last = 'Sizes elsewhere are those of the last run.' if found.runs_differ else ''
+    lines = (*first, last, *needs(found, ship), examined(found), where)
+    return (*filter(None, lines), *facts(found), *earlier(found), *found.notes)
+
+
+def needs(found: DiagnosisResult, ship: Ship | None) -> tuple[str, ...]:
+    """
+    Say what she needs at her usual speed; nothing of a ship that is not known.
+    """
+    if ship is None or found.question:
+        return ()
+    return in_service(found.estimates, found.in_runs or ship)
 
 
 def sentence(found: DiagnosisResult) -> str:

@@ -28,22 +28,8 @@ _GAP_STEPS = 5.0
 _WORTH_SAYING = 0.1  # of the window
 
 
-def missing_s(series: Series, start_ns: int, end_ns: int) -> float:
-    """
-    Return how much of a window an input says nothing of.
-
-    Parameters
-    ----------
-    series : n samples
-        Inside the window.
-    start_ns, end_ns
-        The window [ns].
-
-    Returns
-    -------
-    float
-        Sum of the gaps [s].
-    """
+def _missing_s(series: Series, start_ns: int, end_ns: int) -> float:
+    """Return how much of a window an input says nothing of: the sum of its gaps [s]."""
     if not len(series):
         return (end_ns - start_ns) / SECOND_NS
     edges = np.concatenate([[start_ns], series.time_ns, [end_ns]])
@@ -72,7 +58,7 @@ def coverage_notes(window: Window) -> tuple[str, ...]:
     for name in window.motion:
         series = window.series(name)
         if len(series) or len(before.series(name)):
-            missing[name] = missing_s(series, window.start_ns, window.end_ns)
+            missing[name] = _missing_s(series, window.start_ns, window.end_ns)
     notes = []
     for name, seconds in missing.items():
         if seconds <= _WORTH_SAYING * length:

@@ -30,8 +30,10 @@ from shipdrag_ros.report.drawing import (
     PURPLE,
     SIZE,
     SKY,
-    STYLE,
     VERMILION,
+    new_figure,
+    one_axis,
+    styled,
 )
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -67,8 +69,8 @@ def track_pictures(estimate: Estimate, mass_kg: float) -> tuple[Figure, ...]:
     """
     figures = []
     for name, track in estimate.tracks.items():
-        with matplotlib.rc_context(STYLE):
-            figure = Figure(figsize=SIZE, layout='constrained')
+        with styled():
+            figure = new_figure(*SIZE)
             top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
             _draw_track(top, bottom, name, track, (estimate.start_ns, mass_kg))
         figures.append(figure)
@@ -128,8 +130,8 @@ def order_picture(estimate: Estimate) -> Figure:
     panels = [panel for panel in panels if np.any(np.isfinite(panel[1]))]
     if len(panels) == 2:  # one input: its variance is that of the problem
         panels = panels[1:]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(SIZE[0], 0.4 + 1.5 * len(panels)), layout='constrained')
+    with styled():
+        figure = new_figure(SIZE[0], 0.4 + 1.5 * len(panels))
         axes = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
         for axis, (label, variance) in zip(axes, panels):
             axis.semilogy(orders, variance, color=BLUE, marker='o', markersize=3)
@@ -162,18 +164,13 @@ def resistance_picture(
     truth
         Speeds [m/s] and r [m/s²] of the simulation, where the record is simulated.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, layout='constrained')
-        draw_resistance(figure.subplots(), estimate, ship, truth=truth)
+    with one_axis(*SIZE) as (figure, axis):
+        draw_resistance(axis, estimate, ship, truth=truth)
     return figure
 
 
 def draw_resistance(
-    axis: Axes,
-    estimate: Estimate,
-    ship: Ship,
-    *,
-    truth: tuple[Float64, Float64] | None = None,
+    axis: Axes, estimate: Estimate, ship: Ship, *, truth: tuple[Float64, Float64] | None = None
 ) -> None:
     """
     Draw on axes what `resistance_picture` shows.
@@ -217,9 +214,7 @@ def power_picture(curve: ForceCurve, ship: Ship) -> Figure:
     """
     scale = _PictureUnits.of(ship)
     force = Force.of(curve, ship)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, layout='constrained')
-        axis = figure.subplots()
+    with one_axis(*SIZE) as (figure, axis):
         watts = force.speed_m_s / scale.power
         speed = force.speed_m_s / scale.speed
         if np.isfinite(force.clean_n).any():
@@ -256,9 +251,8 @@ def curves_picture(
     combined
         The one curve of all; None where they are not combined.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, layout='constrained')
-        draw_curves(figure.subplots(), dated, ship, combined=combined)
+    with one_axis(*SIZE) as (figure, axis):
+        draw_curves(axis, dated, ship, combined=combined)
     return figure
 
 

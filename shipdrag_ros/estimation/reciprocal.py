@@ -175,10 +175,7 @@ def _shared(estimate: Estimate, curve: ResistanceCurve) -> Float64:
 
 
 def _at(
-    curves: Sequence[ResistanceCurve],
-    values: Sequence[Float64],
-    shifts: Float64,
-    speed: Float64,
+    curves: Sequence[ResistanceCurve], values: Sequence[Float64], shifts: Float64, speed: Float64
 ) -> Float64:
     """Return values of each run at shifted speeds, (runs, m)."""
     rows = zip(curves, values, shifts)

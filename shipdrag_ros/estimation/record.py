@@ -314,8 +314,7 @@ class RunRows:
         of_kind = np.zeros(len(CODES))
         for name, sd in self.white_sd.items():
             of_kind[CODES[name]] = sd**2
-        result: Float64 = of_kind[rows.kind] / weight
-        return result
+        return np.asarray(of_kind[rows.kind] / weight, np.float64)
 
     def condensed(
         self, speed_m_s: float, halved_s: float, *, quick: bool = False
@@ -425,10 +424,8 @@ def _merge(parts: list[_WeightedRows]) -> tuple[Rows, Float64]:
     """Sort rows of several inputs by time; ties keep the order of the inputs."""
     if not parts:
         return Rows(np.empty(0), np.empty(0, np.int64), np.empty(0)), np.empty(0)
-    time_s = np.concatenate([part[0] for part in parts])
+    time_s, value, weight = (np.concatenate([part[i] for part in parts]) for i in (0, 2, 3))
     kind = np.concatenate([np.full(len(part[0]), part[1], np.int64) for part in parts])
-    value = np.concatenate([part[2] for part in parts])
-    weight = np.concatenate([part[3] for part in parts])
     order = np.argsort(time_s, kind='stable')
     return Rows(time_s[order], kind[order], value[order]), weight[order]
 
@@ -468,8 +465,8 @@ def _distance(time_s: Float64, position: Float64) -> Float64:
 
 
 def _ahead(position: Float64, heading_rad: float) -> Float64:
-    result: Float64 = (position - position[0]) @ [math.cos(heading_rad), math.sin(heading_rad)]
-    return result
+    along = [math.cos(heading_rad), math.sin(heading_rad)]
+    return np.asarray((position - position[0]) @ along, np.float64)
 
 
 _ORDER = 12  # of the polynomial that stands for the motion
@@ -515,8 +512,7 @@ def stated_weight(time_s: Float64, value: Float64, variance: Float64) -> Float64
     precision, of_prior = spread / _OF_LOG_CHI2**2, 1.0 / STATED_POWER.sd**2
     found = float((away * follows).sum()) / spread
     power = (precision * found + of_prior * STATED_POWER.mean) / (precision + of_prior)
-    result: Float64 = np.exp(-min(max(power, 0.0), 1.0) * log)
-    return result
+    return np.asarray(np.exp(-min(max(power, 0.0), 1.0) * log), np.float64)
 
 
 @compiled
@@ -574,8 +570,7 @@ def edges_of(
     even = _EVEN * halved_s * np.exp(_EVEN * np.arange(400.0))
     widths = np.minimum(np.minimum(first * _GROWTH ** np.arange(400), longest), even)
     edges = start_s + np.concatenate([[0.0], np.cumsum(widths)])
-    result: Float64 = edges[: int(np.searchsorted(edges, end_s, side='right')) + 1]
-    return result
+    return np.asarray(edges[: np.searchsorted(edges, end_s, side='right') + 1], np.float64)
 
 
 def _crude(rows: Rows, speed_m_s: float, halved_s: float) -> Float64:
@@ -584,8 +579,7 @@ def _crude(rows: Rows, speed_m_s: float, halved_s: float) -> Float64:
         return np.zeros(len(rows.time_s))
     since = 1.0 + np.maximum(rows.time_s - rows.time_s[0], 0.0) / halved_s
     way = speed_m_s * halved_s * np.log(since)
-    result: Float64 = np.where(rows.of(POSITION), way, speed_m_s / since)
-    return result
+    return np.asarray(np.where(rows.of(POSITION), way, speed_m_s / since), np.float64)
 
 
 def condense(

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.display import Table, short_repr
+from shipdrag_ros.display import short_repr
 from shipdrag_ros.posterior.weather import Reference
 from shipdrag_ros.samples import Float64, Int64, kind_of
 
-if TYPE_CHECKING:
-    from shipdrag_ros.ship import Ship
 SIGNIFICANT = 2.0  # fall or rise of dr/dFr, in its standard deviations
 
 
@@ -247,38 +245,6 @@ class Estimate:
     def duration_s(self) -> float:
         """Length of the window [s]."""
         return float(np.int64(self.end_ns) - np.int64(self.start_ns)) * 1e-9
-
-    def summary(self, ship: Ship | None = None) -> tuple[str, ...]:
-        """
-        Say what was found: in knots, kN and kW with a ship, then in m/s and m/s².
-
-        Parameters
-        ----------
-        ship
-            For force, power and the clean hull; None: without them.
-
-        Returns
-        -------
-        tuple of str
-            A paragraph each.
-        """
-        from shipdrag_ros.estimation import words  # it shows what this module holds
-
-        return words.summary(self, ship)
-
-    def table(self, ship: Ship | None = None) -> Table:
-        """
-        Show about ten points of the curve inside its valid range.
-
-        Parameters
-        ----------
-        ship
-            For knots, kN, kW and the clean hull; None: m/s and m/s².
-        """
-        from shipdrag_ros.estimation import words
-
-        curve = self.valid_curve
-        return words.curve_table(curve) if ship is None else words.force_table(curve, ship)
 
 
 def froude_max(curve: ResistanceCurve) -> tuple[float, FroudeMax]:

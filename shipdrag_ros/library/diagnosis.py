@@ -115,13 +115,13 @@ class Diagnosis(Shown):
         return document(self.found, self.ship)
 
     def _lines(self) -> Sequence[str]:
-        return (*self.found.summary(), *words.advice(self.found), *self.notes)
+        return (*words.summary(self.found), *words.advice(self.found), *self.notes)
 
     def table(self) -> Table:
         """
         Show how probable each answer is.
         """
-        return self.found.table()
+        return words.probabilities_table(self.found)
 
     def gaps(self) -> Table:
         """

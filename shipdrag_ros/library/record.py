@@ -132,7 +132,7 @@ class Coastdown(ShownResistance):
         """
         if self.event.estimate is None:
             return tables.facts(self.event)
-        return self.event.estimate.table(self.ship)
+        return estimate_words.force_table(self.curve, self.ship)
 
     def _drawing(self) -> Callable[[Axes], None]:
         from shipdrag_ros.estimation.pictures import draw_resistance

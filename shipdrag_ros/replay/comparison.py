@@ -157,17 +157,12 @@ def _name(message: OutputMessage) -> str:
 
 def _relative_difference(one: OutputMessage | None, other: OutputMessage | None) -> float:
     """Return the largest of all figures of two messages, in parts of the larger figure."""
-    first, second = _figures(one), _figures(other)
+    first, second = _read(one)[0], _read(other)[0]
     if len(first) != len(second) or not len(first):
         return math.inf
     scale = np.maximum(np.abs(first), np.abs(second))
     differs = (first != second) & ~(np.isnan(first) & np.isnan(second))
     return float(np.max(np.abs(first - second)[differs] / scale[differs], initial=0.0))
-
-
-def _figures(message: OutputMessage | None) -> Float64:
-    """Return the figures of a message; none where it cannot be read."""
-    return _read(message)[0]
 
 
 def _read(message: OutputMessage | None) -> tuple[Float64, str]:
@@ -208,7 +203,7 @@ def _sigmas(one: OutputMessage | None, other: OutputMessage | None) -> float:
 
 def _estimates(message: OutputMessage | None) -> dict[float, tuple[float, float]]:
     """Return value and standard deviation of an output; of a curve, by speed."""
-    figures = _figures(message)
+    figures, _ = _read(message)
     if message is not None and message.type == RESISTANCE_CURVE.type:
         table = figures[: len(figures) // 4 * 4].reshape(-1, 4).tolist()
         return {speed: (value, sigma) for speed, value, sigma, _ in table}

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -29,7 +28,7 @@ from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RankedHull, Ranking, RunResult, of_one_ship, together
 from shipdrag_ros.replay.words import StretchSpan, cut_lines, inside, stretch
 from shipdrag_ros.report.document import write_page
-from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE, picture
+from shipdrag_ros.report.drawing import BLUE, SIZE, new_figure, one_axis, picture, styled
 from shipdrag_ros.samples import Float64
 
 _HATCHES = ('///', '\\\\\\', 'xxx', '...')  # distinct in print too
@@ -59,8 +58,8 @@ def cut_picture(coastdown: EndedCoastdown, span_ns: StretchSpan | None, mass_kg:
     def seconds(time_ns: int) -> float:
         return (time_ns - zero_ns) * 1e-9
 
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, layout='constrained')
+    with styled():
+        figure = new_figure(*SIZE)
         regimes = coastdown.regimes
         if regimes is None:
             axis = lowest = figure.subplots()
@@ -150,9 +149,7 @@ def comparison_picture(hulls: Sequence[RankedHull]) -> Figure:
     """
     Draw r(Fr) of several hulls, each inside its valid range.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, layout='constrained')
-        axis = figure.subplots()
+    with one_axis(*SIZE) as (figure, axis):
         for number, hull in enumerate(hulls):
             color, style = LINES[number % len(LINES)]
             curve = hull.curve

@@ -19,14 +19,13 @@ from numpy.typing import ArrayLike
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.coastdown.events import NotCoastdown
-from shipdrag_ros.display import Table, ship_speed, short_repr, utc
+from shipdrag_ros.display import ship_speed, short_repr, utc
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
 from shipdrag_ros.estimation.reciprocal import Combined, combine
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve, froude_max
-from shipdrag_ros.replay import ReplayResult
+from shipdrag_ros.replay import ReplayResult, words
 from shipdrag_ros.replay.coasts import why_no_coastdown
-from shipdrag_ros.replay.words import run_warnings
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, Water
 
@@ -75,7 +74,7 @@ class TrueCurve:
                 'settings': dict(self.settings),
                 'speed_m_s': self.speed_m_s.tolist(),
                 'resistance_m_s2': self.resistance_m_s2.tolist(),
-            },
+            }
         )
 
     @classmethod
@@ -148,20 +147,10 @@ class RunResult(ReplayResult):
         tuple of str
             A paragraph each, the engineer's units first.
         """
-        from shipdrag_ros.replay import words  # it shows what this module holds
-
         if not self.coastdowns:
             dismissed = len(self.not_coastdowns)
             return (words.no_coastdown_sentence(self.steady_lead_s, dismissed, self.why_none),)
         return tuple(line for part in self.coastdowns for line in words.summary(part, self.ship))
-
-    def table(self) -> Table:
-        """
-        Show the coastdowns, a line each.
-        """
-        from shipdrag_ros.replay import tables
-
-        return tables.coastdowns_table([self])
 
     @classmethod
     def of(cls, result: ReplayResult) -> RunResult:
@@ -176,7 +165,7 @@ class RunResult(ReplayResult):
         text = result.run.attachments.get(ATTACHMENT)
         return cls(
             **vars(result),
-            warnings=run_warnings(result),
+            warnings=words.run_warnings(result),
             truth=None if text is None else TrueCurve.from_yaml(text, subject=result.run.name),
             why_none=_why_none(result),
         )

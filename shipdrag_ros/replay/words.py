@@ -24,6 +24,7 @@ from shipdrag_ros.coastdown.events import (
     Reset,
 )
 from shipdrag_ros.display import duration, plus_minus, utc
+from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.replay import Recorded, ReplayResult
@@ -156,7 +157,7 @@ def summary(coastdown: EndedCoastdown, ship: Ship | None = None) -> tuple[str, .
     """
     if coastdown.estimate is None:
         return (f'No resistance could be estimated: {coastdown.failure or "no reason given"}.',)
-    return coastdown.estimate.summary(ship)
+    return estimate_words.summary(coastdown.estimate, ship)
 
 
 def combined_notes(combined: Combined) -> tuple[str, ...]:

@@ -180,7 +180,7 @@ def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]
     assert found.held_out_after is None  # no run tells of another
     assert found.where is not None
     assert found.where.channel == 'force'
-    first, second, *_ = found.summary()
+    first, second, *_ = words.summary(found)
     assert first.startswith('Missing in the model, and not alike in these runs: fouling')
     assert second.startswith('These runs differ: no one state of the hull fits all')
 
@@ -420,4 +420,4 @@ def test_water_and_air_of_one_day_in_a_ship_file_are_said_to_be_that() -> None:
     (said,) = [note for note in found.notes if 'one day' in note]
     assert said.startswith('the ship file states current, which')
     assert 'along the heading of today' in said
-    assert said in found.summary()
+    assert said in words.summary(found)

@@ -319,7 +319,7 @@ def test_an_earlier_diagnosis_names_what_one_run_leaves_open(fouled, alone):
     said = ' '.join(words.earlier(told))
     assert 'The earlier diagnosis then.json (2029-02-15' in said
     assert 'fouling' in said
-    assert set(words.earlier(told)) <= set(told.summary())
+    assert set(words.earlier(told)) <= set(words.summary(told))
     # what it found counts for the next one, with the runs that it holds
     passed_on = EarlierDiagnosis.of(told, SHIP, name='now')
     assert passed_on.before == earlier().runs

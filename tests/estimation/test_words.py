@@ -21,7 +21,7 @@ def test_every_rule_has_words() -> None:
 
 
 def test_the_summary_gives_knots_and_kilowatts_first(estimate: Estimate, ship: Ship) -> None:
-    first, missing, last = estimate.summary(ship)
+    first, missing, last = words.summary(estimate, ship)
     # 0.75 of 8.2 m/s: r = 6.15^2 / 3000 over 20705 t, sigma = 0.02 r + 1e-4
     speed = float(estimate.valid_curve.speed_m_s[84])
     force = 20705.0 * speed**2 / 3000.0
@@ -37,18 +37,18 @@ def test_the_summary_gives_knots_and_kilowatts_first(estimate: Estimate, ship: S
     assert '1.95 to 6.90 m/s' in last
     # sigma / r = 0.02 + 1e-4 / r falls with r: best at the top
     assert 'best at 6.90 m/s: there the specific resistance is 0.01587 ± 0.00083' in last
-    assert estimate.summary() == (last,)
+    assert words.summary(estimate) == (last,)
 
 
 def test_the_summary_says_what_is_over_the_clean_hull(estimate: Estimate, ship: Ship) -> None:
     speed = np.linspace(1.0, 9.0, 30)
     clean = ship.mass_kg * speed**2 / 3600.0  # the ship needs a fifth more
     baseline = TableBaseline(tuple(speed), tuple(clean), 0.03)
-    first, last = estimate.summary(replace(ship, baseline=baseline))
+    first, last = words.summary(estimate, replace(ship, baseline=baseline))
     assert '20.0 ± 9.8 % over the clean hull. Known' in first
     assert 'specific resistance' in last
     high = TableBaseline((8.5, 9.0), (1e5, 2e5), 0.03)
-    _, why, _ = estimate.summary(replace(ship, baseline=high))
+    _, why, _ = words.summary(estimate, replace(ship, baseline=high))
     assert 'from 16.5 knots to 17.5 knots and this curve is outside' in why
 
 
@@ -59,14 +59,15 @@ def test_wind_that_was_read_and_left_in_is_named_and_taken_out(estimate, ship) -
     read = Reference(Knowledge.MEASURED, Knowledge.UNKNOWN)
     parts = {'wind': np.zeros(len(calm.speed_m_s))}
     windy = replace(estimate, calm=calm, reference=read, sigma_parts=parts)
-    first, _ = windy.summary(replace(ship, baseline=baseline))
+    first, _ = words.summary(windy, replace(ship, baseline=baseline))
     of_run, in_calm = first.split(' In calm deep water, with the wind taken out: ')
     assert '20.0 ± 9.8 % over the clean hull' in of_run
     assert (
         'the wind, which was measured, left in as well as the depth, which is not known' in of_run
     )
     assert '(no difference that shows)' in in_calm
-    unread, _ = replace(windy, reference=Reference()).summary(replace(ship, baseline=baseline))
+    windy = replace(windy, reference=Reference())
+    unread, _ = words.summary(windy, replace(ship, baseline=baseline))
     assert unread.endswith(f' In calm deep water, whatever the weather was: {in_calm}')
 
 
@@ -74,7 +75,7 @@ def test_a_model_ship_is_told_in_newtons_and_millimetres(estimate: Estimate, shi
     curve = estimate.curve
     slow = replace(estimate, conditions=replace(curve, speed_m_s=0.1 * curve.speed_m_s))
     model = replace(ship, displaced_volume_m3=14.0 / 1025.0)
-    first, _, last = slow.summary(model)
+    first, _, last = words.summary(slow, model)
     assert first.startswith('At 0.615 m/s: resistance 0.1765 ± 0.0099 N, effective power 0.1086 ')
     assert 'from 0.195 to 0.690 m/s' in last
 
@@ -104,7 +105,8 @@ def test_the_top_of_the_fit_is_not_told_for_the_largest_reading(estimate: Estima
 
 
 def test_an_empty_range_promises_nothing(estimate: Estimate, ship: Ship) -> None:
-    assert replace(estimate, froude_valid=(0.3, 0.3)).summary(ship) == (words.NOTHING_VALID,)
+    nothing = replace(estimate, froude_valid=(0.3, 0.3))
+    assert words.summary(nothing, ship) == (words.NOTHING_VALID,)
 
 
 def test_notes_say_what_the_record_cannot_show(estimate: Estimate) -> None:
@@ -239,7 +241,7 @@ def test_the_truth_adds_its_error(estimate: Estimate, truth: TrueCurve) -> None:
 
 
 def test_an_engineer_reads_knots_kilonewtons_and_kilowatts(estimate: Estimate, ship: Ship) -> None:
-    table = estimate.table(ship)
+    table = words.force_table(estimate.valid_curve, ship)
     assert table.columns == (
         'speed [knots]', 'resistance [kN]', '±', 'effective power [kW]', '±'
     )  # fmt: skip
@@ -252,7 +254,7 @@ def test_an_engineer_reads_knots_kilonewtons_and_kilowatts(estimate: Estimate, s
 def test_the_clean_hull_is_beside_it_where_it_is_stated(estimate: Estimate, ship: Ship) -> None:
     # twice the resistance below, half of it above; stated from 3 m/s
     clean = TableBaseline((3.0, 9.0), (6.2e4, 1.1e6), 0.02)
-    table = estimate.table(replace(ship, baseline=clean))
+    table = words.force_table(estimate.valid_curve, replace(ship, baseline=clean))
     assert table.columns[-3:] == ('clean hull [kN]', 'over the clean hull [%]', '±')
     assert table.rows[0][-3:] == ('-', '-', '-')
     known = [row for row in table.rows if row[-1] != '-']
@@ -276,7 +278,3 @@ def test_one_speed_in_text_has_one_figure(estimate: Estimate, ship: Ship) -> Non
     assert len(beside) > 20
     for speed, resistance, *_ in beside:
         assert resistance == '{} ± {} kN'.format(*rows[speed.removesuffix(' knots')][:2])
-
-
-def test_without_a_ship_a_curve_is_in_si(estimate: Estimate) -> None:
-    assert estimate.table() == words.curve_table(estimate.valid_curve)

@@ -67,7 +67,6 @@ def test_coastdowns_are_a_line_each(run: RunResult) -> None:
     assert first[3].endswith('kN')
     assert first[4].endswith('kW')
     assert second[2:] == ('-', '-', '-', '-', 'too few samples')
-    assert run.table() == cells.coastdowns_table([run])
 
 
 def test_the_valid_curve_round_trips(run: RunResult, tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from shipdrag_ros.coastdown.events import (
     Regimes,
     Reset,
 )
+from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import (
@@ -66,7 +67,7 @@ def test_a_coastdown_without_estimate_gives_its_reason(coastdown, ship):
     failed = replace(coastdown, estimate=None, failure='too few samples')
     assert words.summary(failed, ship) == ('No resistance could be estimated: too few samples.',)
     assert coastdown.estimate is not None
-    assert words.summary(coastdown, ship) == coastdown.estimate.summary(ship)
+    assert words.summary(coastdown, ship) == estimate_words.summary(coastdown.estimate, ship)
 
 
 SURPLUS = Unreadable.SURPLUS_JOINT.value

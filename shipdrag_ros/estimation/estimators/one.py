@@ -225,8 +225,9 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
     logs = {name: CODES[name] for name in record.stamps if CODES[name] % KIND_COUNT == LOG}
     for name, code in logs.items() if len(record.stamps) > 1 else ():
         at = k + motion.own(code) + motion.SCALE
-        which = 'log' if len(logs) == 1 else f'log {name}'
-        yield _log_scale_note(float(found.mean[at]), float(sd[at]), which)
+        log = 'log' if len(logs) == 1 else f'log {name}'
+        off = plus_minus(100.0 * float(found.mean[at]), 200.0 * float(sd[at]), '+')
+        yield f'the {log} reads {off} % off (two standard deviations): taken out, and in the band'
     yield from _wrong_notes(found, record)
     if not logs:
         yield (
@@ -281,14 +282,6 @@ def _held_unit(found: RunPosterior) -> float:
     return float(unit / read(found, at_stop, without=_CONDITIONS).resistance_m_s2[0])
 
 
-def _log_scale_note(scale: float, sd: float, which: str) -> str:
-    """Say by how much a log is off, and that the band holds it."""
-    return (
-        f'the {which} reads {plus_minus(100.0 * scale, 200.0 * sd, "+")} % off (two standard '
-        'deviations): taken out, and in the band'
-    )
-
-
 def _wrong_notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
     """Say what is wrong with an instrument, where that is not unlikely."""
     k, inputs = found.problem.coefficients, dict[tuple[int, int], list[str]]()
@@ -337,7 +330,7 @@ def _result(
     conditions = _curve(part, use, ship)
     whole = _curve(read(found, grid), use, ship)
     part = read(found, grid, without=_CALM)
-    calm = _curve(part, use, ship)
+    calm, sigmas = _curve(part, use, ship), part.parts_m_s2 | {'n_r': _of_n_r(part, ship)}
     curve = conditions if reference.unknown else calm
     stamps = np.concatenate(list(record.stamps.values()))
     without = _CONDITIONS if reference.unknown else _CALM
@@ -351,7 +344,7 @@ def _result(
         conditions=conditions,
         whole=whole,
         reference=reference,
-        sigma_parts={name: each[use] for name, each in _parts(part, ship).items()},
+        sigma_parts={name: each[use] for name, each in sigmas.items()},
         sigma_shared_m_s2=part.shared_m_s2[use],
         start_ns=int(stamps.min()),
         end_ns=int(stamps.max()),
@@ -398,10 +391,6 @@ def _of_n_r(part: ReadOut, ship: Ship) -> Float64:
     # where the file states retardations, n_r is no unknown of the motion
     inertia = 1.0 + ship.n_r(part.speed_m_s)
     return np.abs(part.resistance_m_s2) / inertia * ship.added_mass.sd
-
-
-def _parts(part: ReadOut, ship: Ship) -> dict[str, Float64]:
-    return part.parts_m_s2 | {'n_r': _of_n_r(part, ship)}
 
 
 def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
