@@ -141,11 +141,7 @@ class Indexed(NamedTuple):
     damage: list[str]
 
 
-def index_messages(
-    segments: Sequence[bytes],
-    offsets: Sequence[int],
-    wanted: UInt8,
-) -> Indexed:
+def index_messages(segments: Sequence[bytes], offsets: Sequence[int], wanted: UInt8) -> Indexed:
     """
     Find the messages in the records of some segments.
 

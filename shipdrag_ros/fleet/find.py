@@ -22,13 +22,7 @@ from typing import TYPE_CHECKING, Any
 from shipdrag_ros.bags.mcap_file import METADATA, PART, is_bag_folder
 from shipdrag_ros.errors import FleetError, ShipFileError, reason_of
 from shipdrag_ros.ship import SHIP_FILE
-from shipdrag_ros.sources.beside import (
-    BAGS,
-    FIRST_BYTES,
-    RUN_FILE,
-    is_source,
-    run_file,
-)
+from shipdrag_ros.sources.beside import BAGS, FIRST_BYTES, RUN_FILE, is_source, run_file
 
 if TYPE_CHECKING:
     from fsspec import AbstractFileSystem
@@ -447,12 +441,7 @@ class _Search:
         yield from self._source(folder, bag, files, whole=True)
 
     def _source(
-        self,
-        folder: Folder,
-        bag: str,
-        files: tuple[Entry, ...],
-        *,
-        whole: bool = False,
+        self, folder: Folder, bag: str, files: tuple[Entry, ...], *, whole: bool = False
     ) -> Iterator[BagToRead]:
         problem = next((_problem(entry) for entry in files if _problem(entry)), '')
         if problem:

@@ -71,11 +71,7 @@ def outputs(event: events.Event, *, node: str = topics.DEFAULT_NODE) -> list[top
                 topics.EventKind.DISMISSED,
                 end_ns,
                 f'nearly a coastdown: {text}',
-                {
-                    'start_ns': str(start_ns),
-                    'end_ns': str(end_ns),
-                    'reason': dismissal.value,
-                },
+                {'start_ns': str(start_ns), 'end_ns': str(end_ns), 'reason': dismissal.value},
             )
         case events.WholeGlide():  # for a diagnosis of the record alone
             return []

@@ -18,13 +18,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import types
 from shipdrag_ros.samples import FURTHER, Block
 
-_SPEEDS = (
-    types.TWIST_WITH_COVARIANCE,
-    types.TWIST,
-    types.VELOCITY,
-    types.ODOMETRY,
-    types.DVL,
-)
+_SPEEDS = (types.TWIST_WITH_COVARIANCE, types.TWIST, types.VELOCITY, types.ODOMETRY, types.DVL)
 # one more type: its name in types.py, here, and how it is read at the end of decoding.py
 _FIRST: Mapping[str, tuple[str, ...]] = {
     'speed_through_water': _SPEEDS,

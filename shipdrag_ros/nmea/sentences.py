@@ -146,10 +146,7 @@ def _ground_rmc(fields: Fields) -> MeasuredValue:
 
 def _position(fields: Fields) -> MeasuredValue:
     _check_fix(fields)
-    return MeasuredValue(
-        _angle(fields, 'lat', 'NS', 90.0),
-        _angle(fields, 'lon', 'EW', 180.0),
-    )
+    return MeasuredValue(_angle(fields, 'lat', 'NS', 90.0), _angle(fields, 'lon', 'EW', 180.0))
 
 
 def _angle(fields: Fields, name: str, sides: str, largest_deg: float) -> float:
@@ -314,17 +311,11 @@ def _water_uhaw(fields: Fields) -> MeasuredValue:
 
 
 READERS: Mapping[str, tuple[tuple[Channel, FieldsReader], ...]] = {
-    'RMC': (
-        (Channel.POSITION_GEODETIC, _position),
-        (Channel.SPEED_OVER_GROUND, _ground_rmc),
-    ),
+    'RMC': ((Channel.POSITION_GEODETIC, _position), (Channel.SPEED_OVER_GROUND, _ground_rmc)),
     'GGA': ((Channel.POSITION_GEODETIC, _position),),
     'GLL': ((Channel.POSITION_GEODETIC, _position),),
     'VTG': ((Channel.SPEED_OVER_GROUND, _ground_vtg),),
-    'VBW': (
-        (Channel.SPEED_THROUGH_WATER, _water_vbw),
-        (Channel.SPEED_OVER_GROUND, _ground_vbw),
-    ),
+    'VBW': ((Channel.SPEED_THROUGH_WATER, _water_vbw), (Channel.SPEED_OVER_GROUND, _ground_vbw)),
     'VHW': ((Channel.SPEED_THROUGH_WATER, _water_vhw),),
     'PUHAW': ((Channel.SPEED_THROUGH_WATER, _water_uhaw),),
     'HDT': ((Channel.HEADING, _yaw_hdt),),

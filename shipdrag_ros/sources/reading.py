@@ -98,9 +98,7 @@ def _refuse_two_ships(names: Sequence[str], blocks: Sequence[Block]) -> None:
         known.append((name, here))
 
 
-def read_joined(
-    parts: Sequence[tuple[Format, Job]],
-) -> tuple[Log, list[ImportResult], list[str]]:
+def read_joined(parts: Sequence[tuple[Format, Job]]) -> tuple[Log, list[ImportResult], list[str]]:
     """
     Read the measurements of files as one log.
 

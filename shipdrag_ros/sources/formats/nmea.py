@@ -659,9 +659,5 @@ FORMAT = format.Format(
     about=__doc__,
     score=_score,
     read=read_nmea,
-    options=(
-        format.DATE,
-        format.TRANSDUCER,
-        format.Option('--no-checksum', ''),
-    ),
+    options=(format.DATE, format.TRANSDUCER, format.Option('--no-checksum', '')),
 )

@@ -361,10 +361,7 @@ class _Wanted(NamedTuple):
         return columns_of(self.name, [each.key for each in self.columns], units)
 
     def unclear(
-        self,
-        units: Sequence[str] = (),
-        why: str = 'unit not known',
-        other: str = 'another unit',
+        self, units: Sequence[str] = (), why: str = 'unit not known', other: str = 'another unit'
     ) -> _Unclear:
         """
         Say why the columns are not used, and what to type, in units where not in the likely ones.

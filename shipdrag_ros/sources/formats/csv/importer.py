@@ -56,14 +56,7 @@ from shipdrag_ros.samples import (
     Int64,
 )
 from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Job, Option
-from shipdrag_ros.sources.formats.csv.cells import (
-    ORDERS,
-    Bad,
-    BadCell,
-    combined,
-    usable,
-    zone_of,
-)
+from shipdrag_ros.sources.formats.csv.cells import ORDERS, Bad, BadCell, combined, usable, zone_of
 from shipdrag_ros.sources.formats.csv.guess import Guess
 from shipdrag_ros.sources.formats.csv.table import (
     SPEED_UNITS,
