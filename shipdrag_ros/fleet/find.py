@@ -122,9 +122,7 @@ class Tree:
         self.name = posixpath.basename(self.root.rstrip('/')) or self.root
 
     def folders(self) -> Iterator[Folder]:
-        """
-        Yield every folder from the top, sorted by name; each once.
-        """
+        """Yield every folder from the top, sorted by name; each once."""
         seen: set[str] = set()
         waiting: list[tuple[str, tuple[str, ...]]] = [(self.root, ())]
         while waiting:
@@ -174,9 +172,7 @@ class Tree:
         return text
 
     def beginning(self, path: str, size: int) -> bytes:
-        """
-        Return the first bytes of a file; none where it cannot be read.
-        """
+        """Return the first bytes of a file; none where it cannot be read."""
         try:
             with self._fs.open(path, 'rb') as file:
                 first: bytes = file.read(size)
@@ -185,18 +181,14 @@ class Tree:
         return first
 
     def url(self, path: str) -> str:
-        """
-        Return what a worker opens: a path, or a URL.
-        """
+        """Return what a worker opens: a path, or a URL."""
         if self.protocol == LOCAL:
             return path
         url: str = self._fs.unstrip_protocol(path)
         return url
 
     def read(self, path: str, parts: tuple[str, ...] = ()) -> tuple[list[str], Folder]:
-        """
-        Return the folders in a folder, and itself.
-        """
+        """Return the folders in a folder, and itself."""
         try:
             # not `fs.walk`: it follows no link, and drops what it cannot list below the top
             listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)

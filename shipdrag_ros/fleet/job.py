@@ -369,9 +369,7 @@ def _bag_row(job: BagJob, error: str | None = None) -> Row:
 
 
 def failed(job: BagJob, why: str) -> BagResult:
-    """
-    Return the row of a bag of which nothing came.
-    """
+    """Return the row of a bag of which nothing came."""
     return BagResult(_bag_row(job, why))
 
 

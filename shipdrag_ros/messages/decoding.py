@@ -487,9 +487,7 @@ def _readings() -> Mapping[Source, _Reading]:
 
 
 def fields_of(channel: Channel, type_name: str) -> dict[str, int]:
-    """
-    Return the fields that hold values and variances of a channel, with the column of each.
-    """
+    """Return the fields that hold values and variances of a channel, with the column of each."""
     ((_, fields), *_) = _readings()[Source(channel.input, type_name)].ways
     return {field: column for column, field in enumerate(fields[:COLUMNS]) if field}
 

@@ -66,9 +66,7 @@ class EncodedBatch(NamedTuple):
 
 
 def input_type(channel: Channel) -> str:
-    """
-    Return the type that samples of a channel are encoded in.
-    """
+    """Return the type that samples of a channel are encoded in."""
     return _ENCODERS[channel].type
 
 

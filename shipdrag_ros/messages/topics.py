@@ -52,9 +52,7 @@ class OutputTopic:
     latched: bool = False
 
     def under(self, node: str) -> str:
-        """
-        Return the full name below a node, `/coastdown_node` for instance.
-        """
+        """Return the full name below a node, `/coastdown_node` for instance."""
         return f'{node}/{self.name}'
 
 
@@ -263,9 +261,7 @@ def diagnosis_message(text: str, stamp_ns: int, *, node: str = DEFAULT_NODE) -> 
 
 
 def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage:
-    """
-    Encode a note for `~/events`.
-    """
+    """Encode a note for `~/events`."""
     kind = types.class_of('diagnostic_msgs/msg/DiagnosticStatus')
     status = types.make(
         'diagnostic_msgs/msg/DiagnosticStatus',
@@ -301,9 +297,7 @@ def read_event(payload: bytes) -> EventNote:
 
 
 def output_message(topic: OutputTopic, message: object, stamp_ns: int, node: str) -> OutputMessage:
-    """
-    Encode a message of the node.
-    """
+    """Encode a message of the node."""
     return OutputMessage(
         topic.under(node), topic.type, types.serialize(topic.type, message), stamp_ns
     )
@@ -365,9 +359,7 @@ class Status:
 
     @classmethod
     def of(cls, part: str, level: int, message: str, values: Mapping[str, object]) -> Status:
-        """
-        Make a status of values of any kind.
-        """
+        """Make a status of values of any kind."""
         return cls('', part, int(level), message, {k: _text(v) for k, v in values.items()})
 
     @property
@@ -376,9 +368,7 @@ class Status:
         return self.part.removeprefix('input ') if self.part.startswith('input ') else ''
 
     def number(self, key: str) -> float | None:
-        """
-        Return a finite figure, None where there is none; the unit need not be given.
-        """
+        """Return a finite figure, None where there is none; the unit need not be given."""
         for name, text in self.values.items():
             if name == key or name.partition(' [')[0] == key:
                 try:
@@ -396,9 +386,7 @@ class Health:
     statuses: tuple[Status, ...]
 
     def of(self, part: str) -> Status:
-        """
-        Return the status of a part; one that says nothing where there is none.
-        """
+        """Return the status of a part; one that says nothing where there is none."""
         blank = Status.of(part, OK, '', {})
         return next((status for status in self.statuses if status.part == part), blank)
 

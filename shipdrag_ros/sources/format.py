@@ -79,9 +79,7 @@ class Head:
         return tuple(line.strip() for line in whole if line.strip())[:200]
 
     def share(self, is_one: Callable[[str], object]) -> float:
-        """
-        Return which share of the lines fulfils a condition.
-        """
+        """Return which share of the lines fulfils a condition."""
         return sum(bool(is_one(line)) for line in self.lines) / max(len(self.lines), 1)
 
 

@@ -109,9 +109,7 @@ class TableResult(ImportResult):
         return f'{self.rows - self.left_out} rows'
 
     def summary(self, bag: Path) -> list[str]:
-        """
-        Say how much was read, and what is to be known of it.
-        """
+        """Say how much was read, and what is to be known of it."""
         first, *others = super().summary(bag)
         if self.base_ns is not None:
             since = f'The times count from a start; it was put at {display.utc(self.base_ns)}.'

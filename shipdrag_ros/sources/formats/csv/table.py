@@ -114,9 +114,7 @@ class InputColumns:
         return [unit in ANGLE_UNITS for unit in self.units] == [False, True]
 
     def by_channel(self) -> Iterator[InputColumns]:
-        """
-        Yield the columns of each channel: of several shafts, one each.
-        """
+        """Yield the columns of each channel: of several shafts, one each."""
         for channels in (SHAFTS, PITCHES):
             if self.channel is channels[0]:
                 for channel, name, unit in zip(channels, self.names, self.units, strict=False):
@@ -330,25 +328,19 @@ Cells = NDArray[Any]
 
 
 def are_numbers(cells: Cells) -> bool:
-    """
-    Say whether a column holds numbers, and no texts.
-    """
+    """Say whether a column holds numbers, and no texts."""
     return cells.dtype.kind in 'fiu'
 
 
 def written(values: NDArray[Any]) -> Cells:
-    """
-    Return the shortest text that reads back as the same value; '' where there is none.
-    """
+    """Return the shortest text that reads back as the same value; '' where there is none."""
     listed = values.tolist()
     texts = ['' if each is None or each != each else str(each).strip() for each in listed]
     return np.array(texts, object)
 
 
 def texts_of(cells: Cells) -> Cells:
-    """
-    Return cells as text.
-    """
+    """Return cells as text."""
     return written(cells) if are_numbers(cells) else cells
 
 
@@ -382,15 +374,11 @@ class TableRows:
         return TableRows(self.lines[chosen], columns, self.beyond)
 
     def texts(self, place: int) -> Cells:
-        """
-        Return the cells (n,) of a column as text.
-        """
+        """Return the cells (n,) of a column as text."""
         return texts_of(self.columns[place])
 
     def joined(self, places: Sequence[int]) -> Cells:
-        """
-        Return the cells (n,) of one column, or the text of two: a date and its time of day.
-        """
+        """Return the cells (n,) of one column, or the text of two: a date and its time of day."""
         if len(places) == 1:
             return self.columns[places[0]]
         joined = np.full(len(self), '', object)
@@ -468,9 +456,7 @@ class LogTable:
         return found
 
     def error(self, text: str) -> ImportDataError:
-        """
-        Return an error of the table, which names its file.
-        """
+        """Return an error of the table, which names its file."""
         return ImportDataError(f'{str(self.path)!r}{text}')
 
     def _layout(self, lines: Sequence[str]) -> tuple[int, str, Sequence[str]]:
@@ -516,9 +502,7 @@ class LogTable:
         raise self.error(f' has no column {name!r}; it has {listed}, {hint}')
 
     def columns(self, names: Iterable[str]) -> list[int]:
-        """
-        Return the places of columns given by names or numbers.
-        """
+        """Return the places of columns given by names or numbers."""
         return [self.column(name) for name in names]
 
     def key(self, place: int) -> str:
@@ -554,9 +538,7 @@ class LogTable:
             yield self._by_column(some)
 
     def first_rows(self, most: int) -> TableRows:
-        """
-        Return the first rows.
-        """
+        """Return the first rows."""
         return next(self.rows(most=most), self._by_column([]))
 
     def _by_column(self, rows: Sequence[LogRow]) -> TableRows:
@@ -666,9 +648,7 @@ class Numbers:
     values: Float64
 
     def column(self, name: str) -> Float64:
-        """
-        Return (n,) values of a column that is there.
-        """
+        """Return (n,) values of a column that is there."""
         return self.values[:, self.names.index(name)]
 
 
