@@ -111,10 +111,8 @@ class FileSummary:
             case mcap.Metadata():
                 index = mcap.MetadataIndex(at, length, record.name)
             case _:
-                times, about = (
-                    (record.log_time, record.create_time),
-                    (record.name, record.media_type),
-                )
+                times = record.log_time, record.create_time
+                about = record.name, record.media_type
                 index = mcap.AttachmentIndex(at, length, *times, len(record.data), *about)
         self.records[type(index), at] = index
         return index
@@ -236,8 +234,8 @@ def _stated(data: Buffer) -> FileSummary | None:
     for stated in summary.of(mcap.Statistics):
         summary.counts.update(stated.channel_message_counts)
         listed = summary.statistics()
-        counted = (name for name in vars(stated) if name.endswith('_count') and name != _MESSAGES)
         # messages outside chunks have no index
+        counted = {name for name in vars(stated) if name.endswith('_count')} - {'message_count'}
         if stated.message_count and not stated.chunk_count:
             return None
         if any(getattr(listed, name) != getattr(stated, name) for name in counted):
@@ -245,9 +243,6 @@ def _stated(data: Buffer) -> FileSummary | None:
         _follow(data, summary)
         return summary
     return None
-
-
-_MESSAGES = 'message_count'
 
 
 def _follow(data: Buffer, summary: FileSummary) -> None:

@@ -365,9 +365,8 @@ def _rosbag2(path: Path) -> BagFiles:
 
 
 def _without_metadata(path: Path) -> list[BagFiles]:
-    files = sorted(
-        (file for file in path.iterdir() if file.name.endswith(_SUFFIXES)), key=_natural_order
-    )
+    named = (file for file in path.iterdir() if file.name.endswith(_SUFFIXES))
+    files = sorted(named, key=_natural_order)
     if not files:
         if any(path.glob('*.db3*')):
             raise BagError(f'{str(path)!r} is a bag in sqlite3 storage; {IMPORT}')

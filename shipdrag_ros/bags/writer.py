@@ -74,14 +74,7 @@ CHUNK_RANGE = 1 << 14, 1 << 20
 
 
 def private_opener(path: str, flags: int) -> int:
-    """
-    Open a file that is made: not readable by everybody, never through a link, and locked.
-
-    Parameters
-    ----------
-    path, flags
-        As `open` hands them to its `opener`.
-    """
+    """Make a file for `open`: not readable by everybody, never through a link, and locked."""
     file = os.open(path, flags | os.O_NOFOLLOW, 0o640)
     with suppress(OSError):  # not every file system has locks
         flock(file, LOCK_EX | LOCK_NB)

@@ -435,7 +435,7 @@ class _Search:
     def _source(
         self, folder: Folder, bag: str, files: tuple[Entry, ...], *, whole: bool = False
     ) -> Iterator[BagToRead]:
-        problem = next((_problem(entry) for entry in files if _problem(entry)), '')
+        problem = next(filter(None, map(_problem, files)), '')
         if problem:
             self._skip(bag, problem)
             return

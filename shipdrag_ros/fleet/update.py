@@ -175,15 +175,12 @@ def _jobs(
     twins: list[Twin] = []
     for digests, same in copies.items():
         parts = max(same, key=lambda each: bool(each[0].run))  # the first that says most
-        digest = content_hash(digests, parts[0], learnt)
+        kept = parts[0]
+        digest = content_hash(digests, kept, learnt)
         jobs[digest] = BagJob(parts, digest, learnt)
-        for other in same:
-            if other is not parts:
-                differs = (other[0].beside.ship, other[0].run) != (
-                    parts[0].beside.ship,
-                    parts[0].run,
-                )
-                twins.append(Twin(other[0].bag, parts[0].bag, differs))
+        for other in (each[0] for each in same if each is not parts):
+            differs = (other.beside.ship, other.run) != (kept.beside.ship, kept.run)
+            twins.append(Twin(other.bag, kept.bag, differs))
     return jobs, twins, unread
 
 

@@ -23,15 +23,8 @@ FRAME = 'base_link'
 PLANE = 'position'
 """Frame of `~/forecast_path`: metres as `position` sends them, or east and north of its first."""
 CURVE_FIELDS = ('speed', 'resistance', 'sigma', 'froude')
-FORECAST_FIELDS = (
-    'time',
-    'speed',
-    'speed_low',
-    'speed_high',
-    'distance',
-    'distance_low',
-    'distance_high',
-)
+FORECAST_FIELDS: tuple[str, ...] = ('time', 'speed', 'speed_low', 'speed_high')
+FORECAST_FIELDS += ('distance', 'distance_low', 'distance_high')
 _FLOAT64_BYTES = 8
 
 

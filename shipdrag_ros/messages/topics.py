@@ -19,17 +19,13 @@ from shipdrag_ros.messages import types
 from shipdrag_ros.samples import FURTHER, Block
 
 _SPEEDS = (types.TWIST_WITH_COVARIANCE, types.TWIST, types.VELOCITY, types.ODOMETRY, types.DVL)
+_POSITIONS: tuple[str, ...] = (types.POSE_WITH_COVARIANCE, types.POSE, types.POINT, types.ODOMETRY)
+_POSITIONS += (types.NAV_SAT_FIX,)
 # one more type: its name in types.py, here, and how it is read at the end of decoding.py
 _FIRST: Mapping[str, tuple[str, ...]] = {
     'speed_through_water': _SPEEDS,
     'speed_over_ground': _SPEEDS,
-    'position': (
-        types.POSE_WITH_COVARIANCE,
-        types.POSE,
-        types.POINT,
-        types.ODOMETRY,
-        types.NAV_SAT_FIX,
-    ),
+    'position': _POSITIONS,
     'heading': (types.QUATERNION, types.IMU, types.POSE, types.FLOAT64),
     'shaft': (types.JOINT_STATE,),
     'rudder': (types.JOINT_STATE,),
@@ -64,15 +60,7 @@ FORECAST = OutputTopic('forecast', types.POINT_CLOUD, latched=True)
 FORECAST_PATH = OutputTopic('forecast_path', types.PATH, latched=True)
 EVENTS = OutputTopic('events', types.DIAGNOSTIC_ARRAY)
 DIAGNOSIS = OutputTopic('diagnosis', types.STRING, latched=True)
-OUTPUT_TOPICS: tuple[OutputTopic, ...] = (
-    SPEED,
-    RESISTANCE,
-    RESISTANCE_CURVE,
-    FORECAST,
-    FORECAST_PATH,
-    EVENTS,
-    DIAGNOSIS,
-)
+OUTPUT_TOPICS = (SPEED, RESISTANCE, RESISTANCE_CURVE, FORECAST, FORECAST_PATH, EVENTS, DIAGNOSIS)
 
 
 @dataclass(frozen=True)
@@ -256,8 +244,7 @@ def diagnosis_message(text: str, stamp_ns: int, *, node: str = DEFAULT_NODE) -> 
     stamp_ns
         End of the coastdown; the message itself holds no time [ns].
     """
-    payload = types.serialize(DIAGNOSIS.type, types.make(DIAGNOSIS.type, data=text))
-    return OutputMessage(DIAGNOSIS.under(node), DIAGNOSIS.type, payload, stamp_ns)
+    return output_message(DIAGNOSIS, types.make(DIAGNOSIS.type, data=text), stamp_ns, node)
 
 
 def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage:

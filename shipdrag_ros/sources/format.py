@@ -132,15 +132,7 @@ def _date(text: str) -> date:
         raise ImportDataError(f'{text!r}, expected YYYY-MM-DD') from None
 
 
-def positive(text: str) -> float:
-    """
-    Read a finite number above 0.
-
-    Raises
-    ------
-    ImportDataError
-        If it is none.
-    """
+def _positive(text: str) -> float:
     return _number(text, 'a number above 0', lambda value: 0.0 < value < inf)
 
 
@@ -159,8 +151,8 @@ def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
 
 
 DATE = Option('--date', 'YYYY-MM-DD', read=_date)
-GEAR = Option('--gear', 'RATIO', read=positive)
-RATE = Option('--rate', 'HZ', read=positive)
+GEAR = Option('--gear', 'RATIO', read=_positive)
+RATE = Option('--rate', 'HZ', read=_positive)
 TRANSDUCER = Option('--transducer', 'M', read=_depth_m)
 
 

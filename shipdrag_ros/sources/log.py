@@ -252,9 +252,6 @@ def iso_ns(text: str, zone: tzinfo) -> int | None:
     return time_ns if 0 <= time_ns < LIMIT_NS else None
 
 
-Counted = Mapping[str, Mapping[str, int]]
-
-
 @dataclass(frozen=True, kw_only=True)
 class ImportResult:
     """
@@ -291,7 +288,7 @@ class ImportResult:
     understood: tuple[Understood, ...] = ()
     notes: tuple[str, ...] = ()
     sources: Mapping[str, str] = field(default_factory=dict)
-    not_taken: Counted = field(default_factory=dict)
+    not_taken: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     not_used: Mapping[str, int] | Sequence[str] = field(default_factory=dict)
 
     counted: ClassVar = ('messages', ' of their input')

@@ -247,9 +247,8 @@ def _start_in(frames: Iterable[N2kFrame]) -> int | None:
                 if 0 < days < 0xFFFD and of_day < 864_000_000:
                     time_ns = days * DAY_NS + of_day * 100_000 - since_ns
                     # a day begins at midnight, by the line's own time of day
-                    return (
-                        time_ns if frame.cycle_ns != DAY_NS else round(time_ns / DAY_NS) * DAY_NS
-                    )
+                    of_days = frame.cycle_ns == DAY_NS
+                    return round(time_ns / DAY_NS) * DAY_NS if of_days else time_ns
     return None
 
 

@@ -357,18 +357,7 @@ def _columns(values: array[int], width: int) -> Int64:
 def _stamps(
     place: Int64, code: UInt8, received: Int64, stated: Int64, steps: Int64
 ) -> tuple[Int64, NDArray[np.str_]]:
-    """
-    Return the times (n,) of samples [ns], and why one has none.
-
-    Parameters
-    ----------
-    place, code, received : (n,)
-        Of their sentences, channels and times of receipt.
-    stated : (2, s)
-        Place and time of the sentences that state one.
-    steps : (3, m)
-        Place, time and receipt of those of them that moved the clock.
-    """
+    """Return the times (n,) of samples [ns], and why one has none; see `TakenSentences`."""
     stamps = received.copy()  # before the first time
     reason = np.where(received == _NONE, _BEFORE, '').astype('U32')
     own = np.isin(place, stated[0])

@@ -506,16 +506,7 @@ def _counts(time: TimeColumn, texts: Sequence[str]) -> RowClock:
 
 
 class _Dates:
-    """
-    Reads dates, or times of day alone.
-
-    Parameters
-    ----------
-    order
-        Of year, month and day; '' of times of day.
-    zone
-        Of dates that state none.
-    """
+    """Reads dates in an order of year, month and day, or, without one, times of day alone."""
 
     def __init__(self, order: str = '', zone: tzinfo = UTC) -> None:
         self._order = order

@@ -411,16 +411,9 @@ class Guess:
         order, zone = options.get('date_order', ''), options.get('zone', UTC)
         self.time = None if time is None else replace(time, order=order, zone=zone)
         if not given:
-            self._find()
-
-    def _find(self) -> None:
-        """Find the inputs by names and values."""
-        if self._is_plain():
-            self._plain()
-        else:
-            self._by_names()
-        if not any(each.channel.input in ALL_MOTION for each in self.inputs):
-            raise self._nothing()
+            (self._plain if self._is_plain() else self._by_names)()
+            if not any(each.channel.input in ALL_MOTION for each in self.inputs):
+                raise self._nothing()
 
     def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
         """Return the columns of some roles, none where one is missing."""

@@ -55,7 +55,7 @@ from shipdrag_ros.samples import (
     Channel,
     Int64,
 )
-from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Job, Option
+from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Option
 from shipdrag_ros.sources.formats.csv.cells import ORDERS, Bad, BadCell, combined, usable, zone_of
 from shipdrag_ros.sources.formats.csv.guess import Guess
 from shipdrag_ros.sources.formats.csv.table import (
@@ -351,10 +351,6 @@ def _score(head: Head) -> float:
     return NO if table.width == 1 else LIKELY if known else POSSIBLE
 
 
-def _open(job: Job, log: Log) -> TableResult:
-    return read_csv(LogTable(job.source), log, job.options, progress=job.progress)
-
-
 def _where(text: str) -> tuple[str, str]:
     column, equals, value = text.partition('=')
     if not (column and equals):
@@ -376,7 +372,7 @@ FORMAT = Format(
     kind='a CSV file',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=lambda job, log: read_csv(LogTable(job.source), log, job.options, progress=job.progress),
     options=(
         Option('--map', 'INPUT=COLUMN[:unit]', many=True),
         Option('--time', 'COLUMN[:unit]', read=parse_time),

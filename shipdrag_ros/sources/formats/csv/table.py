@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, tzinfo
-from decimal import Decimal
 from importlib import resources
 from itertools import islice, zip_longest
 from math import pi
@@ -68,12 +67,7 @@ _COUNTS = {
     'shaft': (1, 2, 3, 4),
     'pitch': (1, 2, 3, 4),
 }
-NANOSECONDS: Mapping[str, Decimal] = {
-    's': Decimal(10**9),
-    'ms': Decimal(10**6),
-    'us': Decimal(10**3),
-    'ns': Decimal(1),
-}
+NANOSECONDS = {'s': 10**9, 'ms': 10**6, 'us': 10**3, 'ns': 1}
 
 
 @dataclass(frozen=True)
