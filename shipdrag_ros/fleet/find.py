@@ -166,26 +166,21 @@ class Tree:
         if len(content) > TEXT_LIMIT_BYTES:
             raise FleetError(f'{path!r} is longer than {TEXT_LIMIT_BYTES} bytes')
         try:
-            text: str = content.decode('utf-8-sig')
+            return str(content.decode('utf-8-sig'))
         except UnicodeDecodeError as error:
             raise FleetError(f'{path!r} is not UTF-8: {error}') from error
-        return text
 
     def beginning(self, path: str, size: int) -> bytes:
         """Return the first bytes of a file; none where it cannot be read."""
         try:
             with self._fs.open(path, 'rb') as file:
-                first: bytes = file.read(size)
+                return bytes(file.read(size))
         except Exception:  # each file system has errors of its own
             return b''
-        return first
 
     def url(self, path: str) -> str:
         """Return what a worker opens: a path, or a URL."""
-        if self.protocol == LOCAL:
-            return path
-        url: str = self._fs.unstrip_protocol(path)
-        return url
+        return path if self.protocol == LOCAL else str(self._fs.unstrip_protocol(path))
 
     def read(self, path: str, parts: tuple[str, ...] = ()) -> tuple[list[str], Folder]:
         """Return the folders in a folder, and itself."""
@@ -193,8 +188,7 @@ class Tree:
             # not `fs.walk`: it follows no link, and drops what it cannot list below the top
             listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)
         except Exception as error:  # each file system has errors of its own
-            why = reason_of(error)
-            return [], Folder(path, parts, (), f'cannot be read: {why}')
+            return [], Folder(path, parts, (), f'cannot be read: {reason_of(error)}')
         folders, files = [], []
         for about in listed:
             place = about['name'].rstrip('/')
@@ -408,8 +402,7 @@ class _Search:
         return Path(path).resolve().is_relative_to(self._store)
 
     def _in_folder(self, folder: Folder) -> Iterator[BagToRead]:
-        names = [entry.name for entry in folder.files]
-        if is_bag_folder(names):
+        if is_bag_folder([entry.name for entry in folder.files]):
             yield from self._bag_folder(folder)
             return
         others = [e for e in folder.files if not e.name.endswith(_BESIDE)]

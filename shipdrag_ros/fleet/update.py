@@ -186,8 +186,7 @@ def _jobs(
 
 def _at_once(store: Store) -> Iterator[str]:
     """Say which runs are there twice by their time, of each ship."""
-    table = read_coastdowns(store.path).to_pylist()
-    rows = [row for row in table if not row['error']]
+    rows = [row for row in read_coastdowns(store.path).to_pylist() if not row['error']]
     for name, group in groupby(rows, key=itemgetter('ship')):
         own = list(group)
         twice = same_time(own)

@@ -291,14 +291,12 @@ def layout_of(type_name: str, payload: bytes) -> MessageLayout:
 
 def definition(type_name: str) -> str:
     """Return the full `ros2msg` text of a type, dependencies included."""
-    text: str = _store().generate_msgdef(type_name, ros_version=2)[0]
-    return text
+    return str(_store().generate_msgdef(type_name, ros_version=2)[0])
 
 
 def type_hash(type_name: str) -> str:
     """Return the RIHS01 hash by which ROS 2 knows definitions."""
-    digest: str = _store().hash_rihs01(type_name)
-    return digest
+    return str(_store().hash_rihs01(type_name))
 
 
 def is_stamped(type_name: str) -> bool:

@@ -331,8 +331,7 @@ def _arrived(times: Int64) -> Int64:
         arrived[place] = newest_ns
         if behind == SET_BACK:  # the clock was set before the first of these
             since = slice(place - SET_BACK, place + 1)
-            before_ns = int(arrived[place - SET_BACK - 1])
-            set_back_ns = before_ns - int(times[since][0])
+            set_back_ns = int(arrived[place - SET_BACK - 1]) - int(times[since][0])
             arrived[since] = times[since] + set_back_ns
             newest_ns, behind = int(arrived[place]), 0
     return arrived
