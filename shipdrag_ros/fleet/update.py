@@ -119,11 +119,8 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     before = store.done()
     names = {(part.root, part.bag) for job in jobs.values() for part in job.sources}
     names |= {(each.root, each.bag) for each in unread}
-    stale = [
-        digest
-        for digest, done in before.items()
-        if digest not in jobs and (done.root, done.bag) in names
-    ]
+    others = {digest: done for digest, done in before.items() if digest not in jobs}
+    stale = [digest for digest, done in others.items() if (done.root, done.bag) in names]
     for digest in stale:
         store.remove(digest)
     to_do = {key: job for key, job in jobs.items() if not _is_done(before.get(key))}
@@ -133,10 +130,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     after = store.done()
     bags = {key: after[key] for key in jobs}
     notes = [*found.notes, *_keep_ships(store, jobs, bags, texts), *_at_once(store)]
-    gone = sum(
-        (done.root, done.bag) not in names for key, done in before.items() if key not in jobs
-    )
-    if gone:
+    if gone := len(others) - len(stale):
         notes.append(
             f'{gone} bag(s) of the store are not below these folders; their rows stay in it'
         )

@@ -307,7 +307,7 @@ BLANKS = ' '
 ROWS = 1 << 10
 """Read at a time."""
 
-_SAMPLE_LINES = 400
+_SAMPLE_LINES, _LOOKED_AT = 400, 10_001  # those that are not blank, of the first
 _LINE = 1 << 20  # characters; no row of a table is as long
 _DATE = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d\d(:\d\d.*)?')
 _KNOWN_UNITS = {*UNITS, *OTHER_UNITS, 'utc', 'hh:mm:ss'}
@@ -437,17 +437,13 @@ class LogTable:
     def _first_lines(self) -> list[tuple[int, str]]:
         """Return the first lines that are not blank, with their numbers."""
         blank = DELIMITERS + ' \r\n'
-        found = []
+        numbered = islice(enumerate(self._lines(), start=1), _LOOKED_AT)
         try:
-            for number, line in enumerate(self._lines(), start=1):
-                if line.strip(blank).strip():
-                    found.append((number, line))
-                if len(found) >= _SAMPLE_LINES or number > 10_000:
-                    break
+            filled = ((number, line) for number, line in numbered if line.strip(blank).strip())
+            return list(islice(filled, _SAMPLE_LINES))
         except OSError as error:
             why = error.strerror or error
             raise self.error(f' cannot be read: {why}; give a CSV file') from error
-        return found
 
     def error(self, text: str) -> ImportDataError:
         """Return an error of the table, which names its file."""
