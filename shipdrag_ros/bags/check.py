@@ -210,10 +210,8 @@ class _Facts:
     def _message_index(self, place: records.Place) -> None:
         if self._chunk is None:
             return
-        channel, offset = (
-            int.from_bytes(self._data[place.start : place.start + 2], 'little'),
-            place.offset,
-        )
+        offset = place.offset
+        channel = int.from_bytes(self._data[place.start : place.start + 2], 'little')
         if channel in self._chunk.message_index_offsets:
             self._add(offset, place.name, DamageKind.DUPLICATE)
         self._chunk.message_index_offsets[channel] = offset

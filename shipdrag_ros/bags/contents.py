@@ -38,9 +38,7 @@ INDEXES = {
 
 
 def key_of(record: Any) -> tuple[type, int]:
-    """
-    Return what a record of a summary is about: its kind, and a number or a place.
-    """
+    """Return what a record of a summary is about: its kind, and a number or a place."""
     for name in ('id', 'chunk_start_offset', 'offset', 'group_opcode'):
         if hasattr(record, name):
             return type(record), int(getattr(record, name))
@@ -69,9 +67,7 @@ class FileSummary:
         self._verified: set[tuple[type, int]] = set()
 
     def of(self, *kinds: type) -> list[Any]:
-        """
-        Return the records of some kinds, in the order in which they were added.
-        """
+        """Return the records of some kinds, in the order in which they were added."""
         return [record for (kind, _), record in self.records.items() if kind in kinds]
 
     def add(self, record: Any, *, verified: bool = False) -> bool:
@@ -115,10 +111,8 @@ class FileSummary:
             case mcap.Metadata():
                 index = mcap.MetadataIndex(at, length, record.name)
             case _:
-                times, about = (
-                    (record.log_time, record.create_time),
-                    (record.name, record.media_type),
-                )
+                times = record.log_time, record.create_time
+                about = record.name, record.media_type
                 index = mcap.AttachmentIndex(at, length, *times, len(record.data), *about)
         self.records[type(index), at] = index
         return index
@@ -133,9 +127,7 @@ class FileSummary:
         self.times_ns = min(first, first_ns), max(last, last_ns)
 
     def statistics(self) -> mcap.Statistics:
-        """
-        Return what a summary says of the whole file.
-        """
+        """Return what a summary says of the whole file."""
         kinds = Counter(kind for kind, _ in self.records)
         return mcap.Statistics(
             attachment_count=kinds[mcap.AttachmentIndex],
@@ -193,9 +185,7 @@ class _BadIndexError(Exception):
 
 
 def contents_of(data: Buffer) -> Contents:
-    """
-    Return what is in a file; what is wrong with it is stated in `warnings`.
-    """
+    """Return what is in a file; what is wrong with it is stated in `warnings`."""
     found = Contents()
     summary = None
     try:
@@ -244,8 +234,8 @@ def _stated(data: Buffer) -> FileSummary | None:
     for stated in summary.of(mcap.Statistics):
         summary.counts.update(stated.channel_message_counts)
         listed = summary.statistics()
-        counted = (name for name in vars(stated) if name.endswith('_count') and name != _MESSAGES)
         # messages outside chunks have no index
+        counted = {name for name in vars(stated) if name.endswith('_count')} - {'message_count'}
         if stated.message_count and not stated.chunk_count:
             return None
         if any(getattr(listed, name) != getattr(stated, name) for name in counted):
@@ -253,9 +243,6 @@ def _stated(data: Buffer) -> FileSummary | None:
         _follow(data, summary)
         return summary
     return None
-
-
-_MESSAGES = 'message_count'
 
 
 def _follow(data: Buffer, summary: FileSummary) -> None:
@@ -345,9 +332,7 @@ def _with_message(
 
 
 def opened_segment(data: Buffer, segment: mcap.ChunkIndex) -> OpenChunk:
-    """
-    Return the records of a segment.
-    """
+    """Return the records of a segment."""
     place = records.place_at(data, segment.chunk_start_offset)
     if place.opcode == Opcode.CHUNK:
         return records.unpack(data, place)
@@ -357,9 +342,7 @@ def opened_segment(data: Buffer, segment: mcap.ChunkIndex) -> OpenChunk:
 
 
 def left_out(damage: Damage) -> str:
-    """
-    Return the sentence of a warning.
-    """
+    """Return the sentence of a warning."""
     if damage.record == 'attachment' and damage.kind is DamageKind.CHECKSUM:
         return f'the attachment {damage.detail} has a wrong checksum: left out'
     name = damage.record.replace('unknown', 'record')

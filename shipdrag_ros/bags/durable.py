@@ -121,17 +121,13 @@ class LiveFile(BagWriter):
         self.synced_bytes, self.synced_messages = self.size_bytes, self._messages
 
     def in_place(self) -> bool:
-        """
-        Say whether the name is still that of this file.
-        """
+        """Say whether the name is still that of this file."""
         with suppress(FileNotFoundError):
             return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
         return False
 
     def vanished(self) -> bool:
-        """
-        Say whether nothing can open the file any more: it was removed, and not moved.
-        """
+        """Say whether nothing can open the file any more: it was removed, and not moved."""
         return os.fstat(self._file.fileno()).st_nlink == 0
 
     def close(self) -> None:
@@ -147,9 +143,7 @@ class LiveFile(BagWriter):
         self.sync()
 
     def abandon(self) -> None:
-        """
-        Leave the file as the last `sync` did; without messages, remove it.
-        """
+        """Leave the file as the last `sync` did; without messages, remove it."""
         with suppress(OSError):
             self._file.truncate(self.synced_bytes)
         if not self.synced_messages:
@@ -159,9 +153,7 @@ class LiveFile(BagWriter):
             self.release()
 
     def release(self) -> None:
-        """
-        Let others have the file.
-        """
+        """Let others have the file."""
         with suppress(OSError):
             self._file.close()
 
@@ -314,28 +306,20 @@ class DurableRecording:
                 self._hold(self._queue, [message])
 
     def stop(self) -> None:
-        """
-        Ask for the end; returns at once.
-        """
+        """Ask for the end; returns at once."""
         self._ending.set()
 
     def wait_begun(self, timeout_s: float) -> None:
-        """
-        Wait until the first file is there, or has been refused.
-        """
+        """Wait until the first file is there, or has been refused."""
         self._tried.wait(timeout_s)
 
     def wait_ended(self, timeout_s: float) -> bool:
-        """
-        Wait after `stop`; return whether all that can be written is.
-        """
+        """Wait after `stop`; return whether all that can be written is."""
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
     def progress(self) -> RecordingProgress:
-        """
-        Return how the recording stands; asks no disk.
-        """
+        """Return how the recording stands; asks no disk."""
         with self._lock:
             begun_s, now_s = self._begun_s, monotonic()
             first = (self._taken or self._queue)[:1] if begun_s is not None else []

@@ -202,9 +202,7 @@ def mapped(path: Path, unpacked: IO[bytes] | None) -> Iterator[Buffer]:
 
 
 def not_mcap(path: Path, head: bytes) -> str:
-    """
-    Say what a file is that does not begin as MCAP does.
-    """
+    """Say what a file is that does not begin as MCAP does."""
     for magic, what in _FOREIGN.items():
         if head.startswith(magic):
             return f'{str(path)!r} {what}; {IMPORT}'
@@ -260,9 +258,7 @@ METADATA = 'metadata.yaml'
 
 
 def is_bag_folder(names: Collection[str]) -> bool:
-    """
-    Say whether the files of a folder are those of a bag of rosbag2, by their names.
-    """
+    """Say whether the files of a folder are those of a bag of rosbag2, by their names."""
     return any(name == METADATA or name.endswith(('.db3', '.db3.zstd')) for name in names)
 
 
@@ -369,9 +365,8 @@ def _rosbag2(path: Path) -> BagFiles:
 
 
 def _without_metadata(path: Path) -> list[BagFiles]:
-    files = sorted(
-        (file for file in path.iterdir() if file.name.endswith(_SUFFIXES)), key=_natural_order
-    )
+    named = (file for file in path.iterdir() if file.name.endswith(_SUFFIXES))
+    files = sorted(named, key=_natural_order)
     if not files:
         if any(path.glob('*.db3*')):
             raise BagError(f'{str(path)!r} is a bag in sqlite3 storage; {IMPORT}')

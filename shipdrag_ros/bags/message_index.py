@@ -73,31 +73,23 @@ class Messages:
         return Messages(self.data, *(column[part] for column in self.columns))
 
     def payload(self, number: int) -> bytes:
-        """
-        Return the bytes of one message.
-        """
+        """Return the bytes of one message."""
         return self.data[self.start[number] : self.end[number]].tobytes()
 
     def holding(self, payloads: Sequence[bytes | memoryview]) -> Messages:
-        """
-        Return the same with these payloads, in a buffer that holds nothing else.
-        """
+        """Return the same with these payloads, in a buffer that holds nothing else."""
         bounds = _bounds(payloads)
         data = np.frombuffer(b''.join(payloads), np.uint8)
         return replace(self, data=data, start=bounds[:-1], end=bounds[1:])
 
     def packed(self) -> Messages:
-        """
-        Return the same in a buffer that holds nothing else.
-        """
+        """Return the same in a buffer that holds nothing else."""
         data = self.data.data
         spans = zip(self.start.tolist(), self.end.tolist(), strict=True)
         return self.holding([data[start:end] for start, end in spans])
 
     def followed_by(self, other: Messages) -> Messages:
-        """
-        Return these and others in one buffer.
-        """
+        """Return these and others in one buffer."""
         data = np.concatenate((self.data, other.data))
         both = zip(self.columns, other.columns, strict=True)
         joined = [np.concatenate(pair) for pair in both]
@@ -141,11 +133,7 @@ class Indexed(NamedTuple):
     damage: list[str]
 
 
-def index_messages(
-    segments: Sequence[bytes],
-    offsets: Sequence[int],
-    wanted: UInt8,
-) -> Indexed:
+def index_messages(segments: Sequence[bytes], offsets: Sequence[int], wanted: UInt8) -> Indexed:
     """
     Find the messages in the records of some segments.
 

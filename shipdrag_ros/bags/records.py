@@ -37,9 +37,7 @@ _LISTED = 10_000  # of a file that is damaged everywhere; the others are counted
 
 
 class DamageKind(Enum):
-    """
-    Kinds of damage.
-    """
+    """Kinds of damage."""
 
     MISSING = 'missing'
     TRUNCATED = 'truncated'
@@ -112,9 +110,7 @@ class DamageList:
     file: str = ''
 
     def add(self, offset: int, record: str, kind: DamageKind, detail: str = '') -> None:
-        """
-        Take note of a damage.
-        """
+        """Take note of a damage."""
         self.count += 1
         if len(self.listed) < _LISTED:
             self.listed.append(Damage(offset, record, kind, detail, self.file))
@@ -226,18 +222,14 @@ def walk(data: Buffer, start: int, end: int, kinds: frozenset[int] = KINDS) -> I
 
 
 def place_at(data: Buffer, offset: int) -> Place:
-    """
-    Return the place of a record that is whole.
-    """
+    """Return the place of a record that is whole."""
     opcode, length = HEAD.unpack_from(data, offset)
     start = offset + HEAD.size
     return Place(opcode, offset, start, start + length)
 
 
 def read(data: Buffer, place: Place) -> Any:
-    """
-    Return the record of `mcap.records` at a place; None where it does not fit.
-    """
+    """Return the record of `mcap.records` at a place; None where it does not fit."""
     record = BytesIO(
         HEAD.pack(place.opcode, place.end - place.start) + data[place.start : place.end]
     )
@@ -248,9 +240,7 @@ def read(data: Buffer, place: Place) -> Any:
 
 
 def footer_of(data: Buffer) -> Footer | None:
-    """
-    Return the footer of a file that was closed; None without a whole one.
-    """
+    """Return the footer of a file that was closed; None without a whole one."""
     end = len(data) - len(MAGIC)
     offset = end - HEAD.size - 20
     if offset < len(MAGIC) or data[end:] != MAGIC:
@@ -260,9 +250,7 @@ def footer_of(data: Buffer) -> Footer | None:
 
 
 def agrees(data: Buffer, start: int, end: int, stated: int) -> bool:
-    """
-    Say whether a span of any size has the CRC-32 that is stated, if any.
-    """
+    """Say whether a span of any size has the CRC-32 that is stated, if any."""
     value = 0
     for at in range(start, end if stated else start, _CRC_BYTES):
         value = crc32(data[at : min(at + _CRC_BYTES, end)], value)
@@ -271,17 +259,13 @@ def agrees(data: Buffer, start: int, end: int, stated: int) -> bool:
 
 
 def summary_agrees(data: Buffer, footer: Footer) -> bool:
-    """
-    Say whether the summary of a closed file has the checksum that it states, if any.
-    """
+    """Say whether the summary of a closed file has the checksum that it states, if any."""
     # which covers the footer too, up to itself
     return agrees(data, footer.summary_start, len(data) - len(MAGIC) - 4, footer.summary_crc)
 
 
 def attachment_agrees(data: Buffer, place: Place) -> bool:
-    """
-    Say whether an attachment has the checksum that it states, if any.
-    """
+    """Say whether an attachment has the checksum that it states, if any."""
     end = place.end - 4
     return agrees(data, place.start, end, int.from_bytes(data[end : place.end], 'little'))
 
@@ -469,9 +453,7 @@ class OpenChunk:
         return (int(times_ns.min()), int(times_ns.max())) if len(times_ns) else None
 
     def entries(self) -> dict[int, Int64]:
-        """
-        Return what an index lists: log time [ns] and offset, (n, 2), by channel.
-        """
+        """Return what an index lists: log time [ns] and offset, (n, 2), by channel."""
         messages, channel = self.indexed.messages, self.indexed.messages.channel
         offsets = messages.start - (HEAD.size + MESSAGE_HEAD.size)
         listed = np.column_stack((messages.log_ns, offsets))

@@ -252,11 +252,6 @@ def _holds_coastdown(file: IO[bytes]) -> bool:
 
     One of `CHUNK_LIMIT_BYTES` at most is read: where its disk is pulled out, or somebody cuts
     it, that is an error then, while a page of a mapped file that is gone ends the process.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
     """
     small = os.fstat(file.fileno()).st_size <= CHUNK_LIMIT_BYTES
     mapping = nullcontext() if small else mmap(file.fileno(), 0, access=ACCESS_READ)

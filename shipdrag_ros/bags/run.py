@@ -232,9 +232,7 @@ class Run:
         return Ship.load(path)
 
     def about(self) -> dict[str, Any]:
-        """
-        Return what `shipdrag info` has of it.
-        """
+        """Return what `shipdrag info` has of it."""
         topics = self.topics_inside()  # a part is read for it, and may be found damaged
         start_ns, end_ns = self.span_ns or (None, None)
         found = {*FURTHER, *(topic.input for topic in topics)}
@@ -348,9 +346,7 @@ class Run:
         return found
 
     def topics_inside(self) -> tuple[TopicInfo, ...]:
-        """
-        Return what is in it, by name; a part is read for it.
-        """
+        """Return what is in it, by name; a part is read for it."""
         if self._limits_ns == _ALL_NS:
             return self.topics
         keys = [(each.topic, each.type) for each in self.topics]
@@ -360,9 +356,7 @@ class Run:
         return tuple(self._topic(key, n) for key, n in zip(keys, counts.tolist()) if n)
 
     def note(self, warnings: Iterable[str]) -> None:
-        """
-        Add to what is wrong with the run; what was said before is not repeated.
-        """
+        """Add to what is wrong with the run; what was said before is not repeated."""
         self._warnings += (text for text in warnings if text not in self._warnings)
 
     def inputs(self, *, start_ns: int = 0, end_ns: int = sys.maxsize) -> RunSamples:
@@ -480,9 +474,7 @@ class RunSamples:
                 yield from self._items(messages[first : first + BATCH], sources)
 
     def block(self) -> Block:
-        """
-        Return all samples, without the marks.
-        """
+        """Return all samples, without the marks."""
         return concatenate([item for item in self if isinstance(item, Block)])
 
     def _items(self, messages: Messages, sources: tuple[Source, ...]) -> Iterator[Block | Mark]:
@@ -535,9 +527,7 @@ def _unpacked(messages: Messages) -> Messages:
 
 
 def unpacked_message(payload: bytes) -> bytes:
-    """
-    Unpack a message that rosbag2 has packed for itself; one that cannot be is empty.
-    """
+    """Unpack a message that rosbag2 has packed for itself; one that cannot be is empty."""
     try:
         return unpack_zstd(payload, _MESSAGE_LIMIT_BYTES)
     except (ValueError, zstandard.ZstdError):

@@ -55,17 +55,13 @@ _LATCHED = {(topic.name, topic.type) for topic in OUTPUT_TOPICS if topic.latched
 
 
 def attachment(name: str, text: str) -> mcap.Attachment:
-    """
-    Return the record of an attached text.
-    """
+    """Return the record of an attached text."""
     kind = 'application/yaml' if name.endswith('.yaml') else 'text/plain'
     return mcap.Attachment(0, 0, name, kind, text.encode())
 
 
 def as_bytes(*records: Any) -> bytes:
-    """
-    Return records of `mcap.records` as they stand in a file.
-    """
+    """Return records of `mcap.records` as they stand in a file."""
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
@@ -78,14 +74,7 @@ CHUNK_RANGE = 1 << 14, 1 << 20
 
 
 def private_opener(path: str, flags: int) -> int:
-    """
-    Open a file that is made: not readable by everybody, never through a link, and locked.
-
-    Parameters
-    ----------
-    path, flags
-        As `open` hands them to its `opener`.
-    """
+    """Make a file for `open`: not readable by everybody, never through a link, and locked."""
     file = os.open(path, flags | os.O_NOFOLLOW, 0o640)
     with suppress(OSError):  # not every file system has locks
         flock(file, LOCK_EX | LOCK_NB)
@@ -93,9 +82,7 @@ def private_opener(path: str, flags: int) -> int:
 
 
 def sync_directory(path: Path) -> None:
-    """
-    Bring the names in a directory to the disk.
-    """
+    """Bring the names in a directory to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -119,9 +106,7 @@ _PACKERS: dict[Compression, Callable[[bytes], bytes]] = {
 
 
 def content_of(number: int, message: EncodedMessage) -> bytes:
-    """
-    Return the content of the record of a message, by the number of its channel.
-    """
+    """Return the content of the record of a message, by the number of its channel."""
     # a stamp before 1970 has no place here; the message itself keeps it
     publish_ns = max(message.publish_ns, 0)
     return MESSAGE_HEAD.pack(number, 0, message.log_ns, publish_ns) + message.payload
@@ -209,9 +194,7 @@ class RecordWriter:
         return self._number(replace(channel, schema_id=number))
 
     def says(self, record: mcap.Schema | mcap.Channel) -> bool:
-        """
-        Say whether exactly this was declared, with its number.
-        """
+        """Say whether exactly this was declared, with its number."""
         return bool(self._summary.records.get(key_of(record)) == record)
 
     def _number(self, record: mcap.Schema | mcap.Channel) -> int:
@@ -374,9 +357,7 @@ class BagWriter(RecordWriter):
             self.attach(name, text)
 
     def attach(self, name: str, text: str) -> None:
-        """
-        Write a text file into the bag, before the first message if it is to survive a crash.
-        """
+        """Write a text file into the bag, before the first message if it is to survive a crash."""
         self.add(attachment(name, text))
 
     def write_samples(self, block: Block) -> None:

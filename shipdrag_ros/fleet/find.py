@@ -22,13 +22,7 @@ from typing import TYPE_CHECKING, Any
 from shipdrag_ros.bags.mcap_file import METADATA, PART, is_bag_folder
 from shipdrag_ros.errors import FleetError, ShipFileError, reason_of
 from shipdrag_ros.ship import SHIP_FILE
-from shipdrag_ros.sources.beside import (
-    BAGS,
-    FIRST_BYTES,
-    RUN_FILE,
-    is_source,
-    run_file,
-)
+from shipdrag_ros.sources.beside import BAGS, FIRST_BYTES, RUN_FILE, is_source, run_file
 
 if TYPE_CHECKING:
     from fsspec import AbstractFileSystem
@@ -128,9 +122,7 @@ class Tree:
         self.name = posixpath.basename(self.root.rstrip('/')) or self.root
 
     def folders(self) -> Iterator[Folder]:
-        """
-        Yield every folder from the top, sorted by name; each once.
-        """
+        """Yield every folder from the top, sorted by name; each once."""
         seen: set[str] = set()
         waiting: list[tuple[str, tuple[str, ...]]] = [(self.root, ())]
         while waiting:
@@ -174,41 +166,29 @@ class Tree:
         if len(content) > TEXT_LIMIT_BYTES:
             raise FleetError(f'{path!r} is longer than {TEXT_LIMIT_BYTES} bytes')
         try:
-            text: str = content.decode('utf-8-sig')
+            return str(content.decode('utf-8-sig'))
         except UnicodeDecodeError as error:
             raise FleetError(f'{path!r} is not UTF-8: {error}') from error
-        return text
 
     def beginning(self, path: str, size: int) -> bytes:
-        """
-        Return the first bytes of a file; none where it cannot be read.
-        """
+        """Return the first bytes of a file; none where it cannot be read."""
         try:
             with self._fs.open(path, 'rb') as file:
-                first: bytes = file.read(size)
+                return bytes(file.read(size))
         except Exception:  # each file system has errors of its own
             return b''
-        return first
 
     def url(self, path: str) -> str:
-        """
-        Return what a worker opens: a path, or a URL.
-        """
-        if self.protocol == LOCAL:
-            return path
-        url: str = self._fs.unstrip_protocol(path)
-        return url
+        """Return what a worker opens: a path, or a URL."""
+        return path if self.protocol == LOCAL else str(self._fs.unstrip_protocol(path))
 
     def read(self, path: str, parts: tuple[str, ...] = ()) -> tuple[list[str], Folder]:
-        """
-        Return the folders in a folder, and itself.
-        """
+        """Return the folders in a folder, and itself."""
         try:
             # not `fs.walk`: it follows no link, and drops what it cannot list below the top
             listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)
         except Exception as error:  # each file system has errors of its own
-            why = reason_of(error)
-            return [], Folder(path, parts, (), f'cannot be read: {why}')
+            return [], Folder(path, parts, (), f'cannot be read: {reason_of(error)}')
         folders, files = [], []
         for about in listed:
             place = about['name'].rstrip('/')
@@ -422,8 +402,7 @@ class _Search:
         return Path(path).resolve().is_relative_to(self._store)
 
     def _in_folder(self, folder: Folder) -> Iterator[BagToRead]:
-        names = [entry.name for entry in folder.files]
-        if is_bag_folder(names):
+        if is_bag_folder([entry.name for entry in folder.files]):
             yield from self._bag_folder(folder)
             return
         others = [e for e in folder.files if not e.name.endswith(_BESIDE)]
@@ -447,14 +426,9 @@ class _Search:
         yield from self._source(folder, bag, files, whole=True)
 
     def _source(
-        self,
-        folder: Folder,
-        bag: str,
-        files: tuple[Entry, ...],
-        *,
-        whole: bool = False,
+        self, folder: Folder, bag: str, files: tuple[Entry, ...], *, whole: bool = False
     ) -> Iterator[BagToRead]:
-        problem = next((_problem(entry) for entry in files if _problem(entry)), '')
+        problem = next(filter(None, map(_problem, files)), '')
         if problem:
             self._skip(bag, problem)
             return

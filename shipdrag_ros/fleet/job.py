@@ -267,19 +267,15 @@ def _coastdowns(
     shared = ['clocks_apart'] if clocks_apart(result) else []
     if result.run.warnings:
         shared.append('damaged')
+    row = partial(coastdown_row, ship=hull.ship, context=context, flags=shared)
     rows, notes = [], []
     windows = coast_windows(result)
     for coastdown, window in windows:
         diagnosis, said = _diagnosis(result, hull, coastdown, window)
         notes += [f'the coastdown at {coastdown.start_ns} ns{each}' for each in said]
-        rows.append(
-            coastdown_row(coastdown, hull.ship, diagnosis=diagnosis, context=context, flags=shared)
-        )
-    for event in result.events:
-        if isinstance(event, EndedCoastdown) and event.withdrawn:
-            rows.append(
-                coastdown_row(event, hull.ship, diagnosis=None, context=context, flags=shared)
-            )
+        rows.append(row(coastdown, diagnosis=diagnosis))
+    ended = (event for event in result.events if isinstance(event, EndedCoastdown))
+    rows += [row(each, diagnosis=None) for each in ended if each.withdrawn]
     if not windows:
         notes.append(f'no coastdown was found: {why_no_coastdown(result)}')
         notes += _dismissed(result, hull)
@@ -369,9 +365,7 @@ def _bag_row(job: BagJob, error: str | None = None) -> Row:
 
 
 def failed(job: BagJob, why: str) -> BagResult:
-    """
-    Return the row of a bag of which nothing came.
-    """
+    """Return the row of a bag of which nothing came."""
     return BagResult(_bag_row(job, why))
 
 

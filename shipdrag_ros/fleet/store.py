@@ -74,9 +74,7 @@ class BagResult:
 
 
 def bag_row(root: str, bag: str, digest: str, *, error: str | None = None) -> Row:
-    """
-    Return the row of a bag of which nothing is read yet, or nothing can be.
-    """
+    """Return the row of a bag of which nothing is read yet, or nothing can be."""
     return {
         'root': root,
         'bag': bag,
@@ -324,9 +322,7 @@ def _read_line(line: str) -> HullEvent | None:
 
 
 def write_events(events: Sequence[HullEvent]) -> str:
-    """
-    Return the text that `read_events` reads back.
-    """
+    """Return the text that `read_events` reads back."""
     text = StringIO()
     writer = csv.writer(text, lineterminator='\n')
     writer.writerow(HEADER)
@@ -451,9 +447,7 @@ class Store:
             raise FleetError(f'{str(self.path)!r} cannot be written: {error}') from error
 
     def remove(self, digest: str) -> None:
-        """
-        Take a bag out of the store.
-        """
+        """Take a bag out of the store."""
         (self.path / BAGS / f'{digest}.parquet').unlink(missing_ok=True)
         self._remove_rows(digest)
 
@@ -482,9 +476,7 @@ class Store:
 
 
 def partition(ship: str) -> str:
-    """
-    Return the folder of a ship; whatever her name holds, it is one folder.
-    """
+    """Return the folder of a ship; whatever her name holds, it is one folder."""
     return f'{_PARTITION}{quote(ship, safe=" ")}'
 
 
@@ -547,9 +539,7 @@ def read_bags(store: Path) -> pa.Table:
 
 
 def ship_texts(store: Path) -> dict[str, dict[str, str]]:
-    """
-    Return the files kept of each ship: text by file name, by name of the ship.
-    """
+    """Return the files kept of each ship: text by file name, by name of the ship."""
     return {
         unquote(folder.name.removeprefix(_PARTITION)): {
             path.name: path.read_text(encoding='utf-8') for path in sorted(folder.iterdir())
@@ -566,9 +556,7 @@ def coastdown_schema(*, partitioned: bool = False) -> pa.Schema:
 
 
 def bag_schema() -> pa.Schema:
-    """
-    Return the columns of a bag.
-    """
+    """Return the columns of a bag."""
     return _schema(_OF_BAG)
 
 

@@ -119,11 +119,8 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     before = store.done()
     names = {(part.root, part.bag) for job in jobs.values() for part in job.sources}
     names |= {(each.root, each.bag) for each in unread}
-    stale = [
-        digest
-        for digest, done in before.items()
-        if digest not in jobs and (done.root, done.bag) in names
-    ]
+    others = {digest: done for digest, done in before.items() if digest not in jobs}
+    stale = [digest for digest, done in others.items() if (done.root, done.bag) in names]
     for digest in stale:
         store.remove(digest)
     to_do = {key: job for key, job in jobs.items() if not _is_done(before.get(key))}
@@ -133,10 +130,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     after = store.done()
     bags = {key: after[key] for key in jobs}
     notes = [*found.notes, *_keep_ships(store, jobs, bags, texts), *_at_once(store)]
-    gone = sum(
-        (done.root, done.bag) not in names for key, done in before.items() if key not in jobs
-    )
-    if gone:
+    if gone := len(others) - len(stale):
         notes.append(
             f'{gone} bag(s) of the store are not below these folders; their rows stay in it'
         )
@@ -175,22 +169,18 @@ def _jobs(
     twins: list[Twin] = []
     for digests, same in copies.items():
         parts = max(same, key=lambda each: bool(each[0].run))  # the first that says most
-        digest = content_hash(digests, parts[0], learnt)
+        kept = parts[0]
+        digest = content_hash(digests, kept, learnt)
         jobs[digest] = BagJob(parts, digest, learnt)
-        for other in same:
-            if other is not parts:
-                differs = (other[0].beside.ship, other[0].run) != (
-                    parts[0].beside.ship,
-                    parts[0].run,
-                )
-                twins.append(Twin(other[0].bag, parts[0].bag, differs))
+        for other in (each[0] for each in same if each is not parts):
+            differs = (other.beside.ship, other.run) != (kept.beside.ship, kept.run)
+            twins.append(Twin(other.bag, kept.bag, differs))
     return jobs, twins, unread
 
 
 def _at_once(store: Store) -> Iterator[str]:
     """Say which runs are there twice by their time, of each ship."""
-    table = read_coastdowns(store.path).to_pylist()
-    rows = [row for row in table if not row['error']]
+    rows = [row for row in read_coastdowns(store.path).to_pylist() if not row['error']]
     for name, group in groupby(rows, key=itemgetter('ship')):
         own = list(group)
         twice = same_time(own)

@@ -395,9 +395,8 @@ def _fix(extra: Float64) -> Float64:
     """Return latitude and longitude [deg]; NaN where there is no fix."""
     latitude, longitude, variance_north, variance_east, status, covariance_type = extra.T
     table = _table(latitude, longitude, variance_north, variance_east)
-    table[covariance_type == types.class_of(types.NAV_SAT_FIX).COVARIANCE_TYPE_UNKNOWN, 2:] = (
-        np.nan
-    )
+    unknown = types.class_of(types.NAV_SAT_FIX).COVARIANCE_TYPE_UNKNOWN
+    table[covariance_type == unknown, 2:] = np.nan
     # a driver that leaves the status as it is by default, unknown, has not said that there is none
     of = types.class_of('sensor_msgs/msg/NavSatStatus')
     none = (status < of.STATUS_FIX) & (status != of.STATUS_UNKNOWN)
@@ -487,9 +486,7 @@ def _readings() -> Mapping[Source, _Reading]:
 
 
 def fields_of(channel: Channel, type_name: str) -> dict[str, int]:
-    """
-    Return the fields that hold values and variances of a channel, with the column of each.
-    """
+    """Return the fields that hold values and variances of a channel, with the column of each."""
     ((_, fields), *_) = _readings()[Source(channel.input, type_name)].ways
     return {field: column for column, field in enumerate(fields[:COLUMNS]) if field}
 

@@ -66,9 +66,7 @@ class EncodedBatch(NamedTuple):
 
 
 def input_type(channel: Channel) -> str:
-    """
-    Return the type that samples of a channel are encoded in.
-    """
+    """Return the type that samples of a channel are encoded in."""
     return _ENCODERS[channel].type
 
 
@@ -173,15 +171,10 @@ def _template(channel: Channel) -> tuple[bytes, np.dtype[Any]]:
     paths = {path: path for path in encoder.numbers}
     paths |= {'seconds': 'header.stamp.sec', 'nanoseconds': 'header.stamp.nanosec'}
     forms, offsets = zip(*map(number, paths.values()), strict=True)
-    layout = np.dtype(
-        {
-            'names': list(paths),
-            'formats': list(forms),
-            'offsets': list(offsets),
-            'itemsize': len(payload),
-        }
+    size, names = len(payload), list(paths)
+    return payload, np.dtype(
+        {'names': names, 'formats': list(forms), 'offsets': list(offsets), 'itemsize': size}
     )
-    return payload, layout
 
 
 def _kind_of_covariance(given: Float64) -> Float64:
@@ -192,12 +185,8 @@ def _kind_of_covariance(given: Float64) -> Float64:
 
 
 # of the C library, whose last bit is the same for one and for many
-def _sine_of_half(given: Float64) -> Float64:
-    return np.array([*map(sin, (0.5 * given[:, _X]).tolist())])
-
-
-def _cosine_of_half(given: Float64) -> Float64:
-    return np.array([*map(cos, (0.5 * given[:, _X]).tolist())])
+def _of_half(function: Callable[[float], float]) -> FieldNumbers:
+    return lambda given: np.array([*map(function, (0.5 * given[:, _X]).tolist())])
 
 
 class _Encoder(NamedTuple):
@@ -250,7 +239,7 @@ _ENCODERS: dict[Channel, _Encoder] = {
     Channel.HEADING: _Encoder(
         types.QUATERNION,
         'base_link',
-        {'quaternion.z': _sine_of_half, 'quaternion.w': _cosine_of_half},
+        {'quaternion.z': _of_half(sin), 'quaternion.w': _of_half(cos)},
     ),
     **{each: _of_joint(each.name.lower(), moves=True) for each in SHAFTS},
     **{each: _of_joint(each.name.lower(), moves=False) for each in PITCHES},

@@ -17,21 +17,15 @@ from shipdrag_ros.coastdown import events
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast.result import Forecast, PathAhead
 from shipdrag_ros.messages import topics, types
+from shipdrag_ros.messages.topics import EventKind, EventNote
 from shipdrag_ros.samples import Float64
 
 FRAME = 'base_link'
 PLANE = 'position'
 """Frame of `~/forecast_path`: metres as `position` sends them, or east and north of its first."""
 CURVE_FIELDS = ('speed', 'resistance', 'sigma', 'froude')
-FORECAST_FIELDS = (
-    'time',
-    'speed',
-    'speed_low',
-    'speed_high',
-    'distance',
-    'distance_low',
-    'distance_high',
-)
+FORECAST_FIELDS: tuple[str, ...] = ('time', 'speed', 'speed_low', 'speed_high')
+FORECAST_FIELDS += ('distance', 'distance_low', 'distance_high')
 _FLOAT64_BYTES = 8
 
 
@@ -58,29 +52,17 @@ def outputs(event: events.Event, *, node: str = topics.DEFAULT_NODE) -> list[top
             told = topics.event_message(_coastdown_note(event), node=node)
             return [*curve, *_withdrawn(event.end_ns, node), told]
         case events.Onset(start_ns, detected_ns):
-            note = topics.EventNote(
-                topics.EventKind.ONSET,
-                detected_ns,
-                'a coastdown has begun',
-                {'start_ns': str(start_ns)},
-            )
+            values = {'start_ns': str(start_ns)}
+            note = EventNote(EventKind.ONSET, detected_ns, 'a coastdown has begun', values)
         case events.NoEstimate(stamp_ns, reason):
-            note = topics.EventNote(topics.EventKind.NO_ESTIMATE, stamp_ns, reason, {})
+            note = EventNote(EventKind.NO_ESTIMATE, stamp_ns, reason, {})
         case events.NotCoastdown(start_ns, end_ns, dismissal, text):
-            note = topics.EventNote(
-                topics.EventKind.DISMISSED,
-                end_ns,
-                f'nearly a coastdown: {text}',
-                {
-                    'start_ns': str(start_ns),
-                    'end_ns': str(end_ns),
-                    'reason': dismissal.value,
-                },
-            )
+            values = {'start_ns': str(start_ns), 'end_ns': str(end_ns), 'reason': dismissal.value}
+            note = EventNote(EventKind.DISMISSED, end_ns, f'nearly a coastdown: {text}', values)
         case events.WholeGlide():  # for a diagnosis of the record alone
             return []
         case events.Reset(receive_ns, reason):
-            note = topics.EventNote(topics.EventKind.RESET, receive_ns, reason, {})
+            note = EventNote(EventKind.RESET, receive_ns, reason, {})
     return [topics.event_message(note, node=node)]
 
 
@@ -172,7 +154,7 @@ def _cloud(
     return topics.output_message(topic, cloud, stamp_ns, node)
 
 
-def _coastdown_note(event: events.EndedCoastdown) -> topics.EventNote:
+def _coastdown_note(event: events.EndedCoastdown) -> EventNote:
     values = {
         'start_ns': str(event.start_ns),
         'end_ns': str(event.end_ns),
@@ -190,4 +172,4 @@ def _coastdown_note(event: events.EndedCoastdown) -> topics.EventNote:
         low, high = event.estimate.froude_valid
         values['froude_min'] = repr(float(low))
         values['froude_max'] = repr(float(high))
-    return topics.EventNote(topics.EventKind.COASTDOWN, event.end_ns, text, values)
+    return EventNote(EventKind.COASTDOWN, event.end_ns, text, values)

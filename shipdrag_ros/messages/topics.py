@@ -18,24 +18,14 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import types
 from shipdrag_ros.samples import FURTHER, Block
 
-_SPEEDS = (
-    types.TWIST_WITH_COVARIANCE,
-    types.TWIST,
-    types.VELOCITY,
-    types.ODOMETRY,
-    types.DVL,
-)
+_SPEEDS = (types.TWIST_WITH_COVARIANCE, types.TWIST, types.VELOCITY, types.ODOMETRY, types.DVL)
+_POSITIONS: tuple[str, ...] = (types.POSE_WITH_COVARIANCE, types.POSE, types.POINT, types.ODOMETRY)
+_POSITIONS += (types.NAV_SAT_FIX,)
 # one more type: its name in types.py, here, and how it is read at the end of decoding.py
 _FIRST: Mapping[str, tuple[str, ...]] = {
     'speed_through_water': _SPEEDS,
     'speed_over_ground': _SPEEDS,
-    'position': (
-        types.POSE_WITH_COVARIANCE,
-        types.POSE,
-        types.POINT,
-        types.ODOMETRY,
-        types.NAV_SAT_FIX,
-    ),
+    'position': _POSITIONS,
     'heading': (types.QUATERNION, types.IMU, types.POSE, types.FLOAT64),
     'shaft': (types.JOINT_STATE,),
     'rudder': (types.JOINT_STATE,),
@@ -58,9 +48,7 @@ class OutputTopic:
     latched: bool = False
 
     def under(self, node: str) -> str:
-        """
-        Return the full name below a node, `/coastdown_node` for instance.
-        """
+        """Return the full name below a node, `/coastdown_node` for instance."""
         return f'{node}/{self.name}'
 
 
@@ -72,15 +60,7 @@ FORECAST = OutputTopic('forecast', types.POINT_CLOUD, latched=True)
 FORECAST_PATH = OutputTopic('forecast_path', types.PATH, latched=True)
 EVENTS = OutputTopic('events', types.DIAGNOSTIC_ARRAY)
 DIAGNOSIS = OutputTopic('diagnosis', types.STRING, latched=True)
-OUTPUT_TOPICS: tuple[OutputTopic, ...] = (
-    SPEED,
-    RESISTANCE,
-    RESISTANCE_CURVE,
-    FORECAST,
-    FORECAST_PATH,
-    EVENTS,
-    DIAGNOSIS,
-)
+OUTPUT_TOPICS = (SPEED, RESISTANCE, RESISTANCE_CURVE, FORECAST, FORECAST_PATH, EVENTS, DIAGNOSIS)
 
 
 @dataclass(frozen=True)
@@ -264,14 +244,11 @@ def diagnosis_message(text: str, stamp_ns: int, *, node: str = DEFAULT_NODE) -> 
     stamp_ns
         End of the coastdown; the message itself holds no time [ns].
     """
-    payload = types.serialize(DIAGNOSIS.type, types.make(DIAGNOSIS.type, data=text))
-    return OutputMessage(DIAGNOSIS.under(node), DIAGNOSIS.type, payload, stamp_ns)
+    return output_message(DIAGNOSIS, types.make(DIAGNOSIS.type, data=text), stamp_ns, node)
 
 
 def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage:
-    """
-    Encode a note for `~/events`.
-    """
+    """Encode a note for `~/events`."""
     kind = types.class_of('diagnostic_msgs/msg/DiagnosticStatus')
     status = types.make(
         'diagnostic_msgs/msg/DiagnosticStatus',
@@ -307,9 +284,7 @@ def read_event(payload: bytes) -> EventNote:
 
 
 def output_message(topic: OutputTopic, message: object, stamp_ns: int, node: str) -> OutputMessage:
-    """
-    Encode a message of the node.
-    """
+    """Encode a message of the node."""
     return OutputMessage(
         topic.under(node), topic.type, types.serialize(topic.type, message), stamp_ns
     )
@@ -371,9 +346,7 @@ class Status:
 
     @classmethod
     def of(cls, part: str, level: int, message: str, values: Mapping[str, object]) -> Status:
-        """
-        Make a status of values of any kind.
-        """
+        """Make a status of values of any kind."""
         return cls('', part, int(level), message, {k: _text(v) for k, v in values.items()})
 
     @property
@@ -382,9 +355,7 @@ class Status:
         return self.part.removeprefix('input ') if self.part.startswith('input ') else ''
 
     def number(self, key: str) -> float | None:
-        """
-        Return a finite figure, None where there is none; the unit need not be given.
-        """
+        """Return a finite figure, None where there is none; the unit need not be given."""
         for name, text in self.values.items():
             if name == key or name.partition(' [')[0] == key:
                 try:
@@ -402,9 +373,7 @@ class Health:
     statuses: tuple[Status, ...]
 
     def of(self, part: str) -> Status:
-        """
-        Return the status of a part; one that says nothing where there is none.
-        """
+        """Return the status of a part; one that says nothing where there is none."""
         blank = Status.of(part, OK, '', {})
         return next((status for status in self.statuses if status.part == part), blank)
 

@@ -90,9 +90,7 @@ class MalformedMessage(Exception):
 
 
 def class_of(type_name: str) -> Any:
-    """
-    Return the class of a message type, for its constants.
-    """
+    """Return the class of a message type, for its constants."""
     return _store().types[type_name]
 
 
@@ -140,26 +138,20 @@ def _blank_field(node: Nodetype, about: Any) -> Any:
 
 
 def header(stamp_ns: int, frame_id: str) -> Any:
-    """
-    Build a std_msgs/Header.
-    """
+    """Build a std_msgs/Header."""
     seconds, nanoseconds = divmod(int(stamp_ns), SECOND_NS)
     stamp = make('builtin_interfaces/msg/Time', sec=seconds, nanosec=nanoseconds)
     return make('std_msgs/msg/Header', stamp=stamp, frame_id=frame_id)
 
 
 def stamp_ns(message: Any) -> int:
-    """
-    Return the time in the header of a message [ns].
-    """
+    """Return the time in the header of a message [ns]."""
     stamp = message.header.stamp
     return int(stamp.sec) * SECOND_NS + int(stamp.nanosec)
 
 
 def serialize(type_name: str, message: Any) -> bytes:
-    """
-    Return the CDR bytes of a message, little endian.
-    """
+    """Return the CDR bytes of a message, little endian."""
     return bytes(_store().serialize_cdr(message, type_name, little_endian=True))
 
 
@@ -197,9 +189,7 @@ def _deserialize(type_name: str, payload: bytes) -> Any:
 
 
 def leaves(type_name: str, path: str = '') -> Iterator[Leaf]:
-    """
-    Yield the fields of a type in their order, those of its fields in their place.
-    """
+    """Yield the fields of a type in their order, those of its fields in their place."""
     for name, (node, about) in _store().fielddefs[type_name][1]:
         match node:
             case Nodetype.NAME:
@@ -234,9 +224,7 @@ class MessageLayout(NamedTuple):
     fixed: NDArray[np.intp]
 
     def number(self, path: str) -> tuple[np.dtype[Any], int]:
-        """
-        Return form and place of a number, `twist.linear.x` or `covariance[7]` for instance.
-        """
+        """Return form and place of a number, `twist.linear.x` or `covariance[7]` for instance."""
         name, bracket, which = path.partition('[')
         form, first, count = self.arrays[name]
         index = int(which.removesuffix(']')) if bracket else 0
@@ -302,25 +290,17 @@ def layout_of(type_name: str, payload: bytes) -> MessageLayout:
 
 
 def definition(type_name: str) -> str:
-    """
-    Return the full `ros2msg` text of a type, dependencies included.
-    """
-    text: str = _store().generate_msgdef(type_name, ros_version=2)[0]
-    return text
+    """Return the full `ros2msg` text of a type, dependencies included."""
+    return str(_store().generate_msgdef(type_name, ros_version=2)[0])
 
 
 def type_hash(type_name: str) -> str:
-    """
-    Return the RIHS01 hash by which ROS 2 knows definitions.
-    """
-    digest: str = _store().hash_rihs01(type_name)
-    return digest
+    """Return the RIHS01 hash by which ROS 2 knows definitions."""
+    return str(_store().hash_rihs01(type_name))
 
 
 def is_stamped(type_name: str) -> bool:
-    """
-    Say whether a type begins with a header, which holds the time of measurement.
-    """
+    """Say whether a type begins with a header, which holds the time of measurement."""
     return any(name == 'header' for name, _ in _store().fielddefs[type_name][1][:1])
 
 
@@ -357,7 +337,5 @@ def stated_stamp_ns(type_name: str, payload: bytes, arrival_ns: int) -> int:
 
 
 def is_known(type_name: str) -> bool:
-    """
-    Say whether the store has a definition of this type.
-    """
+    """Say whether the store has a definition of this type."""
     return type_name in _store().fielddefs

@@ -272,9 +272,7 @@ class Interpreter:
         return found
 
     def feeding(self, address: str) -> dict[str, str]:
-        """
-        Return by input the sources on an address that are used.
-        """
+        """Return by input the sources on an address that are used."""
         by_input: dict[str, dict[str, None]] = {}
         for channel, choice in sorted(self._choices.items()):
             if choice.held is not None and choice.held[1] == address:
@@ -295,9 +293,7 @@ class Interpreter:
         return ''
 
     def lose(self, address: str) -> None:
-        """
-        Let the sources on an address give way at once: its line is gone.
-        """
+        """Let the sources on an address give way at once: its line is gone."""
         for choice in self._choices.values():
             if choice.held is not None and choice.held[1] == address:
                 choice.last_ns = 0

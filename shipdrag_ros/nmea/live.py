@@ -177,9 +177,7 @@ class LineSplitter:
         self._skipping = False
 
     def feed(self, data: bytes) -> list[str]:
-        """
-        Return the lines that have ended, without their ends; blank ones are left out.
-        """
+        """Return the lines that have ended, without their ends; blank ones are left out."""
         *ended, rest = _ENDS.split(data)
         lines = []
         for piece in ended:
@@ -195,9 +193,7 @@ class LineSplitter:
         return lines
 
     def end(self) -> list[str]:
-        """
-        Take what is open as a line: the datagram, or the connection, has ended.
-        """
+        """Take what is open as a line: the datagram, or the connection, has ended."""
         return self.feed(b'\n')
 
     def _line(self, line: bytes) -> list[str]:
@@ -274,21 +270,15 @@ class LineListener:
         self._thread = threading.Thread(target=self._run, name=f'nmea {address}', daemon=True)
 
     def start(self) -> None:
-        """
-        Begin to hear; returns at once.
-        """
+        """Begin to hear; returns at once."""
         self._thread.start()
 
     def stop(self) -> None:
-        """
-        Ask for the end.
-        """
+        """Ask for the end."""
         self._closing.set()
 
     def close(self) -> None:
-        """
-        End, and wait for it a second at most.
-        """
+        """End, and wait for it a second at most."""
         self.stop()
         self._thread.join(1.0)
 
@@ -460,25 +450,19 @@ class LiveNmea:
         self._listeners = [LineListener(address, self._deliver) for address in addresses]
 
     def start(self) -> None:
-        """
-        Begin to hear; a source that cannot be opened is tried again and said.
-        """
+        """Begin to hear; a source that cannot be opened is tried again and said."""
         for listener in self._listeners:
             listener.start()
 
     def close(self) -> None:
-        """
-        End all threads.
-        """
+        """End all threads."""
         for listener in self._listeners:
             listener.stop()
         for listener in self._listeners:
             listener.close()
 
     def take(self, most: int) -> list[Line]:
-        """
-        Return the oldest lines that wait, at most so many.
-        """
+        """Return the oldest lines that wait, at most so many."""
         with self._lock:
             return [self._waiting.popleft() for _ in range(min(most, len(self._waiting)))]
 
@@ -488,9 +472,7 @@ class LiveNmea:
         return len(self._waiting)
 
     def counts(self) -> Mapping[Address, SourceCounts]:
-        """
-        Return what became of each source.
-        """
+        """Return what became of each source."""
         return {listener.address: listener.counts for listener in self._listeners}
 
     def _deliver(self, address: Address, lines: list[str]) -> None:

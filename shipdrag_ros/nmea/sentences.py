@@ -86,9 +86,7 @@ class Fields(dict[str, str]):
         return ''
 
     def number(self, name: str) -> float:
-        """
-        Return a number; NoValue if there is none.
-        """
+        """Return a number; NoValue if there is none."""
         text = self[name]
         if not text:
             raise NoValue('empty')
@@ -97,18 +95,14 @@ class Fields(dict[str, str]):
         return number
 
     def first(self, *choices: tuple[str, float]) -> float:
-        """
-        Return the first of several fields that is not empty, times its factor.
-        """
+        """Return the first of several fields that is not empty, times its factor."""
         for name, factor in choices:
             if self[name]:
                 return self.number(name) * factor
         raise NoValue('empty')
 
     def check(self, name: str, *, allowed: str) -> None:
-        """
-        Refuse a status that is not allowed; NMEA 0183 before 2.3 has some empty.
-        """
+        """Refuse a status that is not allowed; NMEA 0183 before 2.3 has some empty."""
         if self[name] and self[name] not in allowed:
             status = self[name] if len(self[name]) == 1 else 'not known'
             raise NoValue(f'status {status}')
@@ -146,10 +140,7 @@ def _ground_rmc(fields: Fields) -> MeasuredValue:
 
 def _position(fields: Fields) -> MeasuredValue:
     _check_fix(fields)
-    return MeasuredValue(
-        _angle(fields, 'lat', 'NS', 90.0),
-        _angle(fields, 'lon', 'EW', 180.0),
-    )
+    return MeasuredValue(_angle(fields, 'lat', 'NS', 90.0), _angle(fields, 'lon', 'EW', 180.0))
 
 
 def _angle(fields: Fields, name: str, sides: str, largest_deg: float) -> float:
@@ -272,9 +263,7 @@ def _rudder(fields: Fields) -> MeasuredValue:
 
 
 def has_fix(fields: Fields) -> bool:
-    """
-    Say whether the source itself calls its fix valid.
-    """
+    """Say whether the source itself calls its fix valid."""
     try:
         _check_fix(fields)
     except NoValue:
@@ -314,17 +303,11 @@ def _water_uhaw(fields: Fields) -> MeasuredValue:
 
 
 READERS: Mapping[str, tuple[tuple[Channel, FieldsReader], ...]] = {
-    'RMC': (
-        (Channel.POSITION_GEODETIC, _position),
-        (Channel.SPEED_OVER_GROUND, _ground_rmc),
-    ),
+    'RMC': ((Channel.POSITION_GEODETIC, _position), (Channel.SPEED_OVER_GROUND, _ground_rmc)),
     'GGA': ((Channel.POSITION_GEODETIC, _position),),
     'GLL': ((Channel.POSITION_GEODETIC, _position),),
     'VTG': ((Channel.SPEED_OVER_GROUND, _ground_vtg),),
-    'VBW': (
-        (Channel.SPEED_THROUGH_WATER, _water_vbw),
-        (Channel.SPEED_OVER_GROUND, _ground_vbw),
-    ),
+    'VBW': ((Channel.SPEED_THROUGH_WATER, _water_vbw), (Channel.SPEED_OVER_GROUND, _ground_vbw)),
     'VHW': ((Channel.SPEED_THROUGH_WATER, _water_vhw),),
     'PUHAW': ((Channel.SPEED_THROUGH_WATER, _water_uhaw),),
     'HDT': ((Channel.HEADING, _yaw_hdt),),
@@ -450,9 +433,7 @@ class SentenceReader:
         self._repeated = lru_cache(_KEPT)(self._read)
 
     def read(self, text: str) -> Sentence | str:
-        """
-        Return what follows a `$`, without blanks around it, or why it is no sentence.
-        """
+        """Return what follows a `$`, without blanks around it, or why it is no sentence."""
         # one that states a time is never said again
         return self._read(text) if text[2:5] in TIMED else self._repeated(text)
 
@@ -503,9 +484,7 @@ def _source(name: str, detail: str, talker: str, kind: str) -> SentenceSource:
 
 
 def checksum_of(content: str) -> str:
-    """
-    Return the two digits behind the star, of the characters before it.
-    """
+    """Return the two digits behind the star, of the characters before it."""
     total = int.from_bytes(content.encode('latin-1', 'replace'), 'little')
     half = 1 << len(content).bit_length() + 2
     while half >= 8:  # fold the upper bytes onto the lower ones
@@ -565,9 +544,7 @@ def of_day_ns(hour: str, minute: str, second: str | None, fraction: str | None) 
 
 
 def fraction_ns(digits: str | None) -> int:
-    """
-    Return the part of a second [ns] that the digits behind its point are.
-    """
+    """Return the part of a second [ns] that the digits behind its point are."""
     return int((digits or '')[:9].ljust(9, '0'))
 
 
@@ -602,7 +579,5 @@ def _days(*texts: str) -> int:
 
 
 def days_of(day: date) -> int:
-    """
-    Return the days since 1970.
-    """
+    """Return the days since 1970."""
     return (day - date(1970, 1, 1)).days

@@ -79,9 +79,7 @@ class Head:
         return tuple(line.strip() for line in whole if line.strip())[:200]
 
     def share(self, is_one: Callable[[str], object]) -> float:
-        """
-        Return which share of the lines fulfils a condition.
-        """
+        """Return which share of the lines fulfils a condition."""
         return sum(bool(is_one(line)) for line in self.lines) / max(len(self.lines), 1)
 
 
@@ -134,15 +132,7 @@ def _date(text: str) -> date:
         raise ImportDataError(f'{text!r}, expected YYYY-MM-DD') from None
 
 
-def positive(text: str) -> float:
-    """
-    Read a finite number above 0.
-
-    Raises
-    ------
-    ImportDataError
-        If it is none.
-    """
+def _positive(text: str) -> float:
     return _number(text, 'a number above 0', lambda value: 0.0 < value < inf)
 
 
@@ -161,8 +151,8 @@ def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
 
 
 DATE = Option('--date', 'YYYY-MM-DD', read=_date)
-GEAR = Option('--gear', 'RATIO', read=positive)
-RATE = Option('--rate', 'HZ', read=positive)
+GEAR = Option('--gear', 'RATIO', read=_positive)
+RATE = Option('--rate', 'HZ', read=_positive)
 TRANSDUCER = Option('--transducer', 'M', read=_depth_m)
 
 
@@ -349,11 +339,12 @@ def lines_of(
             check_unpacked(path, size, raw)
 
 
+@dataclass
 class Lines:
     """
     The lines of a text file, without blanks around them.
 
-    Parameters
+    Attributes
     ----------
     path
         Plain or packed with gzip.
@@ -362,9 +353,6 @@ class Lines:
         A line of as many characters is left out.
     progress
         Called with how many bytes are read, and of how many.
-
-    Attributes
-    ----------
     number
         Lines read so far.
     too_long
@@ -373,31 +361,23 @@ class Lines:
         Why the file could not be read to its end; '' if it could.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        *,
-        encoding: str = 'utf-8-sig',
-        longest: int = LINE_BYTES,
-        progress: PartDone | None = None,
-    ) -> None:
-        self.path = path
-        self.number = 0
-        self.too_long: list[int] = []
-        self.damage = ''
-        self._encoding = encoding
-        self._longest = longest
-        self._progress = progress
+    path: Path
+    encoding: str = 'utf-8-sig'
+    longest: int = LINE_BYTES
+    progress: PartDone | None = None
+    number: int = field(default=0, init=False)
+    too_long: list[int] = field(default_factory=list, init=False)
+    damage: str = field(default='', init=False)
 
     def __iter__(self) -> Iterator[str]:
         self.number, self.too_long, self.damage = 0, [], ''
         try:
             # a line ends with LF, CR or both; a serial adapter writes CR alone
             for line in lines_of(
-                self.path, self._longest, encoding=self._encoding, progress=self._progress
+                self.path, self.longest, encoding=self.encoding, progress=self.progress
             ):
                 self.number += 1
-                if len(line) >= self._longest - 1:
+                if len(line) >= self.longest - 1:
                     self.too_long.append(self.number)
                 else:
                     yield line.strip()

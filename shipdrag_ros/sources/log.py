@@ -60,9 +60,7 @@ class Rejected:
     first: list[str] = field(default_factory=list)
 
     def add(self, line: int, text: str) -> None:
-        """
-        Count one more.
-        """
+        """Count one more."""
         self.count += 1
         if len(self.first) < _FIRST_LINES:
             shown = text if len(text) <= _SHOWN else f'{text[:_SHOWN]}...'
@@ -96,16 +94,12 @@ class Tally:
     notes: list[str] = field(default_factory=list)
 
     def reject(self, name: str, reason: str, text: str, line: int | None = None) -> None:
-        """
-        Count what was rejected; it stands on the line, or is the last of the `records`.
-        """
+        """Count what was rejected; it stands on the line, or is the last of the `records`."""
         reasons = self.rejected.setdefault(name, {})
         reasons.setdefault(reason, Rejected()).add(self.records if line is None else line, text)
 
     def note(self, text: str) -> None:
-        """
-        Keep a sentence for the user, once.
-        """
+        """Keep a sentence for the user, once."""
         if text not in self.notes:
             self.notes.append(text)
 
@@ -185,16 +179,12 @@ class Log:
         self.span_ns: tuple[int, int] | None = None
 
     def include(self, *received_ns: int) -> None:
-        """
-        Widen the span by times of arrival [ns].
-        """
+        """Widen the span by times of arrival [ns]."""
         times = (*(self.span_ns or ()), *received_ns)
         self.span_ns = (min(times), max(times))
 
     def take(self, block: Block) -> None:
-        """
-        Take the samples of a file, in order of arrival.
-        """
+        """Take the samples of a file, in order of arrival."""
         self.block = block
         for number, place, count in zip(
             *np.unique(block.channel, return_index=True, return_counts=True), strict=True
@@ -207,9 +197,7 @@ class Log:
             self.include(int(block.receive_ns[0]), int(block.receive_ns[-1]))
 
     def pieces(self) -> Iterator[Block]:
-        """
-        Yield the samples, as many at a time as are encoded together.
-        """
+        """Yield the samples, as many at a time as are encoded together."""
         for first in range(0, len(self.block), BATCH):
             yield self.block[first : first + BATCH]
 
@@ -231,9 +219,7 @@ class Log:
 
 
 def key_of(channel: Channel) -> tuple[str, str]:
-    """
-    Return topic and type that samples of a channel have in a bag.
-    """
+    """Return topic and type that samples of a channel have in a bag."""
     return f'/{channel.input}', input_type(channel)
 
 
@@ -264,9 +250,6 @@ def iso_ns(text: str, zone: tzinfo) -> int | None:
         return None
     time_ns = seconds * SECOND_NS + fraction_ns(found[3])
     return time_ns if 0 <= time_ns < LIMIT_NS else None
-
-
-Counted = Mapping[str, Mapping[str, int]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -305,7 +288,7 @@ class ImportResult:
     understood: tuple[Understood, ...] = ()
     notes: tuple[str, ...] = ()
     sources: Mapping[str, str] = field(default_factory=dict)
-    not_taken: Counted = field(default_factory=dict)
+    not_taken: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     not_used: Mapping[str, int] | Sequence[str] = field(default_factory=dict)
 
     counted: ClassVar = ('messages', ' of their input')
@@ -319,9 +302,7 @@ class ImportResult:
         raise NotImplementedError
 
     def summary(self, bag: Path) -> list[str]:
-        """
-        Say how much was read, and what is to be known of it.
-        """
+        """Say how much was read, and what is to be known of it."""
         length_s = (self.end_ns - self.start_ns) * 1e-9
         lines = [
             f'{bag}: {sum(self.written.values())} messages of {self.size}, '
@@ -347,9 +328,7 @@ class ImportResult:
         return [*lines, *self.summary(path)[1:], *self.details()]
 
     def table(self) -> Table:
-        """
-        Return messages by input, and what each was taken from.
-        """
+        """Return messages by input, and what each was taken from."""
         if not self.sources:
             rows = tuple((name, f'{n}') for name, n in self.written.items())
             return Table(('input', 'messages'), rows)
@@ -359,9 +338,7 @@ class ImportResult:
         )
 
     def details(self) -> list[str]:
-        """
-        Say what was not used, and why.
-        """
+        """Say what was not used, and why."""
         lines = [
             f'{name}: not taken from {", ".join(f"{source} {n}" for source, n in counts.items())}'
             for name, counts in self.not_taken.items()
@@ -371,17 +348,13 @@ class ImportResult:
 
 
 def out_of_order(stamp_ns: Int64) -> tuple[int, int]:
-    """
-    Return how many of (n,) times are before, and how many as, the latest one before them.
-    """
+    """Return how many of (n,) times are before, and how many as, the latest one before them."""
     newest = np.maximum.accumulate(stamp_ns)[:-1]
     return int(np.sum(stamp_ns[1:] < newest)), int(np.sum(stamp_ns[1:] == newest))
 
 
 def most_of(counts: Mapping[str, int] | Sequence[str]) -> str:
-    """
-    List the most frequent ones, with how often they are.
-    """
+    """List the most frequent ones, with how often they are."""
     if not isinstance(counts, Mapping):
         return ', '.join(map(repr, counts))
     shown = sorted(counts.items(), key=lambda each: -each[1])
@@ -390,9 +363,7 @@ def most_of(counts: Mapping[str, int] | Sequence[str]) -> str:
 
 
 def rejected_words(rejected: Mapping[str, Mapping[str, Rejected]]) -> list[str]:
-    """
-    Say what was rejected, and why.
-    """
+    """Say what was rejected, and why."""
     return [
         f'{name}: {each.count} rejected, {reason}: {", ".join(each.first)}'
         for name, reasons in rejected.items()

@@ -98,9 +98,7 @@ def _refuse_two_ships(names: Sequence[str], blocks: Sequence[Block]) -> None:
         known.append((name, here))
 
 
-def read_joined(
-    parts: Sequence[tuple[Format, Job]],
-) -> tuple[Log, list[ImportResult], list[str]]:
+def read_joined(parts: Sequence[tuple[Format, Job]]) -> tuple[Log, list[ImportResult], list[str]]:
     """
     Read the measurements of files as one log.
 
@@ -295,9 +293,7 @@ class LogRun(Run):
         return self._sources
 
     def save(self, out: Path, attachments: Mapping[str, str]) -> None:
-        """
-        Write the run as a bag, see `Run.save`.
-        """
+        """Write the run as a bag, see `Run.save`."""
         known, own = {**self.attachments, **attachments}, self._log.attachments
         with new_bag(out, {k: text for k, text in known.items() if k not in own}) as bag:
             self._log.copy_to(bag)

@@ -74,9 +74,7 @@ class Reading(NamedTuple):
 
 
 def yaw(compass: float) -> float:
-    """
-    Return REP-103 yaw [rad] of an angle clockwise from north [rad]; what is none stays none.
-    """
+    """Return REP-103 yaw [rad] of an angle clockwise from north [rad]; what is none stays none."""
     angle = pi / 2.0 - compass
     return remainder(angle, 2.0 * pi) if isfinite(angle) else angle
 
@@ -130,18 +128,14 @@ class SourcedValues:
         self._numbers: dict[tuple[Channel, Any], int] = {}
 
     def add(self, channel: Channel, origin: Any, at: int, a: float, b: float) -> None:
-        """
-        Take one more.
-        """
+        """Take one more."""
         self._source.append(self._numbers.setdefault((channel, origin), len(self._numbers)))
         self.at.append(at)
         self.a.append(a)
         self.b.append(b)
 
     def counts(self) -> dict[Channel, Counter[Any]]:
-        """
-        Return the number of values by source, of each channel.
-        """
+        """Return the number of values by source, of each channel."""
         found: dict[Channel, Counter[Any]] = {}
         counts = np.bincount(np.array(self._source), minlength=len(self._numbers)).tolist()
         for (channel, origin), number in zip(self._numbers, counts, strict=True):
@@ -149,15 +143,11 @@ class SourcedValues:
         return dict(sorted(found.items()))
 
     def chosen(self) -> dict[Channel, Any]:
-        """
-        Return the one source of each channel.
-        """
+        """Return the one source of each channel."""
         return {channel: best(each) for channel, each in self.counts().items()}
 
     def taken(self) -> tuple[NDArray[np.intp], UInt8]:
-        """
-        Return the places (n,) of the values of the chosen sources, and their channels.
-        """
+        """Return the places (n,) of the values of the chosen sources, and their channels."""
         chosen, source = self.chosen(), np.array(self._source, np.intp)
         use = np.array([chosen[c] == each for c, each in self._numbers], np.bool_)
         code = np.array([channel for channel, _ in self._numbers], np.uint8)
@@ -300,9 +290,7 @@ def stream_format(
 
 
 def counted(lines: Lines, tally: Tally) -> Iterator[str]:
-    """
-    Yield the lines of a log that are not blank, and count all.
-    """
+    """Yield the lines of a log that are not blank, and count all."""
     for line in lines:
         tally.records += 1
         if line:

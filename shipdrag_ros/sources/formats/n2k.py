@@ -82,9 +82,7 @@ class N2kFrame(NamedTuple):
 
 
 def parse(line: str) -> N2kFrame | None:
-    """
-    Take a line apart; None where it is no frame.
-    """
+    """Take a line apart; None where it is no frame."""
     for form in _FORMS:
         found = form.fullmatch(line)
         frame = None if found is None else _frame(found.groupdict(''))
@@ -159,9 +157,7 @@ class FrameClock:
         self._last_ns = 0
 
     def ns(self, frame: N2kFrame) -> int | None:
-        """
-        Return the time of the next frame [ns since 1970], None where it has none.
-        """
+        """Return the time of the next frame [ns since 1970], None where it has none."""
         self._frames += 1
         if self._frame_ns is not None:
             return self._base_ns + round(self._frames * self._frame_ns)
@@ -173,9 +169,7 @@ class FrameClock:
         return self._base_ns + time_ns
 
     def counted_on(self, time_ns: int, cycle_ns: int) -> int:
-        """
-        Return a time that begins again after a cycle, counted on.
-        """
+        """Return a time that begins again after a cycle, counted on."""
         if time_ns < self._last_ns - cycle_ns // 2:
             self._cycles += 1
         elif time_ns > self._last_ns + cycle_ns // 2 and self._cycles:
@@ -238,9 +232,7 @@ def clock_of(job: format.Job, tally: Tally) -> FrameClock:
 
 
 def _start_in(frames: Iterable[N2kFrame]) -> int | None:
-    """
-    Return when the cycle of the first frame began [ns since 1970], by a message with a date.
-    """
+    """Return when the cycle of the first frame began [ns since 1970], by a message with a date."""
     packets, clock = _Packets(), FrameClock()
     for frame in frames:
         if frame.time_ns is None:
@@ -255,9 +247,8 @@ def _start_in(frames: Iterable[N2kFrame]) -> int | None:
                 if 0 < days < 0xFFFD and of_day < 864_000_000:
                     time_ns = days * DAY_NS + of_day * 100_000 - since_ns
                     # a day begins at midnight, by the line's own time of day
-                    return (
-                        time_ns if frame.cycle_ns != DAY_NS else round(time_ns / DAY_NS) * DAY_NS
-                    )
+                    of_days = frame.cycle_ns == DAY_NS
+                    return round(time_ns / DAY_NS) * DAY_NS if of_days else time_ns
     return None
 
 

@@ -107,9 +107,7 @@ class NmeaLog:
         self.tally = Tally()
 
     def texts(self) -> Iterator[tuple[int, str, int | None]]:
-        """
-        Yield line, text and time of receipt [ns] of what may be sentences, in their order.
-        """
+        """Yield line, text and time of receipt [ns] of what may be sentences, in their order."""
         lines = self.lines
         for line in lines:
             if line[:1] == '$' and line.rfind('$') == 0 and '!' not in line:
@@ -120,9 +118,7 @@ class NmeaLog:
             self.tally.reject('line', f'longer than {_LONGEST} characters', '', number)
 
     def lines_of(self, places: Collection[int]) -> dict[int, tuple[int, str]]:
-        """
-        Return line and text of what stands at some places among the texts.
-        """
+        """Return line and text of what stands at some places among the texts."""
         texts = islice(NmeaLog(self.lines.path).texts(), max(places, default=-1) + 1)
         return {
             place: (line, text) for place, (line, text, _) in enumerate(texts) if place in places
@@ -330,9 +326,7 @@ class TakenSentences:
         return self.addresses.total()
 
     def samples(self) -> Block:
-        """
-        Return the samples of the chosen sources, in the order of their sentences.
-        """
+        """Return the samples of the chosen sources, in the order of their sentences."""
         stated, steps = _columns(self._stated, 2), _columns(self._steps, 3)
         stated[1] += self._clock.start_ns or 0
         steps[1] += self._clock.start_ns or 0
@@ -363,18 +357,7 @@ def _columns(values: array[int], width: int) -> Int64:
 def _stamps(
     place: Int64, code: UInt8, received: Int64, stated: Int64, steps: Int64
 ) -> tuple[Int64, NDArray[np.str_]]:
-    """
-    Return the times (n,) of samples [ns], and why one has none.
-
-    Parameters
-    ----------
-    place, code, received : (n,)
-        Of their sentences, channels and times of receipt.
-    stated : (2, s)
-        Place and time of the sentences that state one.
-    steps : (3, m)
-        Place, time and receipt of those of them that moved the clock.
-    """
+    """Return the times (n,) of samples [ns], and why one has none; see `TakenSentences`."""
     stamps = received.copy()  # before the first time
     reason = np.where(received == _NONE, _BEFORE, '').astype('U32')
     own = np.isin(place, stated[0])
@@ -454,9 +437,7 @@ class NmeaResult(ImportResult):
         return f'{self.sentences} sentences in {self.lines} lines'
 
     def summary(self, bag: Path) -> list[str]:
-        """
-        Say how much was read, and what is to be known of it.
-        """
+        """Say how much was read, and what is to be known of it."""
         first, *others = super().summary(bag)
         lost = 'NOT attached (too long, damaged or no UTF-8): keep it'
         kept = 'attached' if self.log_attached else lost
@@ -485,9 +466,7 @@ class NmeaResult(ImportResult):
             )
 
     def details(self) -> list[str]:
-        """
-        Say what was not used, and why.
-        """
+        """Say what was not used, and why."""
         lines = super().details()
         if self.unknown_talkers:
             lines.append(f'Talkers that NMEA 0183 does not know: {most_of(self.unknown_talkers)}')
@@ -659,9 +638,5 @@ FORMAT = format.Format(
     about=__doc__,
     score=_score,
     read=read_nmea,
-    options=(
-        format.DATE,
-        format.TRANSDUCER,
-        format.Option('--no-checksum', ''),
-    ),
+    options=(format.DATE, format.TRANSDUCER, format.Option('--no-checksum', '')),
 )

@@ -72,9 +72,7 @@ class CopyResult(ImportResult):
         return f'a bag of {self.kind}'
 
     def table(self) -> Table:
-        """
-        Return messages by topic.
-        """
+        """Return messages by topic."""
         carried = {topic: name for name, topic in self.inputs.items()}
         return Table(
             ('topic', 'input', 'messages'),

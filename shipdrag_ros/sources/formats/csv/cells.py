@@ -57,9 +57,7 @@ Bad = dict[int, BadCell]
 
 
 def usable(count: int, bad: Bad) -> NDArray[np.bool_]:
-    """
-    Return whether each of so many cells can be used.
-    """
+    """Return whether each of so many cells can be used."""
     good = np.ones(count, np.bool_)
     good[list(bad)] = False
     return good
@@ -225,9 +223,7 @@ def _share_in_minutes(cells: Iterable[str], largest: float, digits: int) -> floa
 
 
 def combined(columns: InputColumns, values: Sequence[Float64]) -> tuple[Float64, Float64]:
-    """
-    Return the two values (n,) of samples from those of their columns, in SI units.
-    """
+    """Return the two values (n,) of samples from those of their columns, in SI units."""
     first, second = values if len(values) > 1 else (values[0], np.zeros(len(values[0])))
     if COMPASS in columns.units:
         yaw = [remainder(each, 2.0 * pi) for each in _finite(pi / 2.0 - first)]
@@ -262,9 +258,7 @@ _IN_TITLE = re.compile(r'(?<!\d)(20\d\d)[-_./]?(\d\d)[-_./]?(\d\d)(?!\d)')
 
 
 def parts(text: str) -> tuple[str, str]:
-    """
-    Split a cell into date and time of day; either may be empty.
-    """
+    """Split a cell into date and time of day; either may be empty."""
     day, blank, clock = re.sub(r'(?<=\d)T(?=\d)', ' ', text, count=1).partition(' ')
     clock = clock.strip()
     if _DAY.fullmatch(day) or _COMPACT.fullmatch(day):
@@ -278,9 +272,7 @@ def parts(text: str) -> tuple[str, str]:
 
 
 def is_date(text: str) -> bool:
-    """
-    Say whether a cell holds a date, a time of day, or both.
-    """
+    """Say whether a cell holds a date, a time of day, or both."""
     day, clock = parts(text)
     return bool(_CLOCK.fullmatch(clock) if clock else _DAY.fullmatch(day))
 
@@ -514,16 +506,7 @@ def _counts(time: TimeColumn, texts: Sequence[str]) -> RowClock:
 
 
 class _Dates:
-    """
-    Reads dates, or times of day alone.
-
-    Parameters
-    ----------
-    order
-        Of year, month and day; '' of times of day.
-    zone
-        Of dates that state none.
-    """
+    """Reads dates in an order of year, month and day, or, without one, times of day alone."""
 
     def __init__(self, order: str = '', zone: tzinfo = UTC) -> None:
         self._order = order
@@ -532,9 +515,7 @@ class _Dates:
         self._last_of_day_ns = 0
 
     def ns(self, cell: str) -> int:
-        """
-        Return the time of a cell [ns], of a time of day from the first midnight on.
-        """
+        """Return the time of a cell [ns], of a time of day from the first midnight on."""
         if not cell:
             raise NoValue('empty')
         day, clock = parts(cell)

@@ -78,9 +78,7 @@ def track_speed(time_s: Float64, latitude: Float64, longitude: Float64) -> Float
 
 
 def plane_speed(time_s: Float64, x: Float64, y: Float64) -> Float64:
-    """
-    Return (n,) speeds [m/s] around each sample, from (n,) positions [m].
-    """
+    """Return (n,) speeds [m/s] around each sample, from (n,) positions [m]."""
     speed = np.full(len(time_s), np.nan)
     good = np.flatnonzero(np.isfinite(time_s) & np.isfinite(x) & np.isfinite(y))
     good = good[np.diff(np.maximum.accumulate(time_s[good]), prepend=-np.inf) > 0.0]
@@ -172,45 +170,33 @@ class FirstRows:
         self._comma = has_decimal_commas(chain.from_iterable(texts))
 
     def texts(self, place: int) -> Cells:
-        """
-        Return the cells of a column; '' where a row is too short.
-        """
+        """Return the cells of a column; '' where a row is too short."""
         return self._rows.texts(place)
 
     def values(self, place: int) -> Float64:
-        """
-        Return (n,) numbers of a column, NaN where a cell is none.
-        """
+        """Return (n,) numbers of a column, NaN where a cell is none."""
         cells = self._rows.columns[place]
         return CellReader(not are_numbers(cells) and has_decimal_commas(cells)).all(cells, {})
 
     def largest(self, place: int) -> float:
-        """
-        Return the largest size of the numbers of a column; 0 where it has none.
-        """
+        """Return the largest size of the numbers of a column; 0 where it has none."""
         return float(np.nanmax(np.abs(self.values(place)), initial=0.0))
 
     def coordinates(self, places: Sequence[int]) -> list[Float64]:
-        """
-        Return latitudes and longitudes [deg], (n,) each, NaN where a cell is none.
-        """
+        """Return latitudes and longitudes [deg], (n,) each, NaN where a cell is none."""
         readers = coordinate_readers(*map(self._style.texts, places))
         cells = [self._rows.columns[place] for place in places]
         return [read.all(each, {}) for read, each in zip(readers, cells, strict=True)]
 
     def readers(self, columns: InputColumns) -> list[CellReader]:
-        """
-        Return what reads the cells of each column, as they are written in the first rows.
-        """
+        """Return what reads the cells of each column, as they are written in the first rows."""
         places = self.table.columns(columns.names)
         if columns.channel.kind is Channel.POSITION_GEODETIC:
             return coordinate_readers(*map(self._style.texts, places))
         return [CellReader(comma=self._comma)] * len(places)
 
     def may_be_degrees(self, places: Sequence[int]) -> bool:
-        """
-        Say whether all numbers of two columns can be latitudes and longitudes.
-        """
+        """Say whether all numbers of two columns can be latitudes and longitudes."""
         numbers = map(self.values, places)
         return all(
             np.all(np.isfinite(degrees) | ~np.isfinite(number))
@@ -218,16 +204,12 @@ class FirstRows:
         )
 
     def clock(self, time: TimeColumn | None, rate_hz: float | None = None) -> RowClock:
-        """
-        Return the clock of the table, see `row_clock`.
-        """
+        """Return the clock of the table, see `row_clock`."""
         places = [] if time is None else self.table.columns(time.names)
         return row_clock(time, rate_hz, self._style.joined(places), self.table)
 
     def seconds(self, time: TimeColumn | None) -> Float64 | None:
-        """
-        Return (n,) times of the rows from the first one [s], NaN where there is none.
-        """
+        """Return (n,) times of the rows from the first one [s], NaN where there is none."""
         if time is None:
             return None
         bad: Bad = {}
@@ -355,16 +337,11 @@ class _Wanted(NamedTuple):
         return ', '.join(repr(each.key) for each in self.columns)
 
     def taken(self, units: Sequence[str]) -> InputColumns:
-        """
-        Return the columns in some units.
-        """
+        """Return the columns in some units."""
         return columns_of(self.name, [each.key for each in self.columns], units)
 
     def unclear(
-        self,
-        units: Sequence[str] = (),
-        why: str = 'unit not known',
-        other: str = 'another unit',
+        self, units: Sequence[str] = (), why: str = 'unit not known', other: str = 'another unit'
     ) -> _Unclear:
         """
         Say why the columns are not used, and what to type, in units where not in the likely ones.
@@ -434,16 +411,9 @@ class Guess:
         order, zone = options.get('date_order', ''), options.get('zone', UTC)
         self.time = None if time is None else replace(time, order=order, zone=zone)
         if not given:
-            self._find()
-
-    def _find(self) -> None:
-        """Find the inputs by names and values."""
-        if self._is_plain():
-            self._plain()
-        else:
-            self._by_names()
-        if not any(each.channel.input in ALL_MOTION for each in self.inputs):
-            raise self._nothing()
+            (self._plain if self._is_plain() else self._by_names)()
+            if not any(each.channel.input in ALL_MOTION for each in self.inputs):
+                raise self._nothing()
 
     def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
         """Return the columns of some roles, none where one is missing."""

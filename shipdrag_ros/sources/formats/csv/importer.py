@@ -55,15 +55,8 @@ from shipdrag_ros.samples import (
     Channel,
     Int64,
 )
-from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Job, Option
-from shipdrag_ros.sources.formats.csv.cells import (
-    ORDERS,
-    Bad,
-    BadCell,
-    combined,
-    usable,
-    zone_of,
-)
+from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Option
+from shipdrag_ros.sources.formats.csv.cells import ORDERS, Bad, BadCell, combined, usable, zone_of
 from shipdrag_ros.sources.formats.csv.guess import Guess
 from shipdrag_ros.sources.formats.csv.table import (
     SPEED_UNITS,
@@ -116,9 +109,7 @@ class TableResult(ImportResult):
         return f'{self.rows - self.left_out} rows'
 
     def summary(self, bag: Path) -> list[str]:
-        """
-        Say how much was read, and what is to be known of it.
-        """
+        """Say how much was read, and what is to be known of it."""
         first, *others = super().summary(bag)
         if self.base_ns is not None:
             since = f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
@@ -340,8 +331,7 @@ def _arrived(times: Int64) -> Int64:
         arrived[place] = newest_ns
         if behind == SET_BACK:  # the clock was set before the first of these
             since = slice(place - SET_BACK, place + 1)
-            before_ns = int(arrived[place - SET_BACK - 1])
-            set_back_ns = before_ns - int(times[since][0])
+            set_back_ns = int(arrived[place - SET_BACK - 1]) - int(times[since][0])
             arrived[since] = times[since] + set_back_ns
             newest_ns, behind = int(arrived[place]), 0
     return arrived
@@ -358,10 +348,6 @@ def _score(head: Head) -> float:
         return POSSIBLE
     known = any(role_and_unit(name)[0] for name in table.header)
     return NO if table.width == 1 else LIKELY if known else POSSIBLE
-
-
-def _open(job: Job, log: Log) -> TableResult:
-    return read_csv(LogTable(job.source), log, job.options, progress=job.progress)
 
 
 def _where(text: str) -> tuple[str, str]:
@@ -385,7 +371,7 @@ FORMAT = Format(
     kind='a CSV file',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=lambda job, log: read_csv(LogTable(job.source), log, job.options, progress=job.progress),
     options=(
         Option('--map', 'INPUT=COLUMN[:unit]', many=True),
         Option('--time', 'COLUMN[:unit]', read=parse_time),

@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, tzinfo
-from decimal import Decimal
 from importlib import resources
 from itertools import islice, zip_longest
 from math import pi
@@ -68,12 +67,7 @@ _COUNTS = {
     'shaft': (1, 2, 3, 4),
     'pitch': (1, 2, 3, 4),
 }
-NANOSECONDS: Mapping[str, Decimal] = {
-    's': Decimal(10**9),
-    'ms': Decimal(10**6),
-    'us': Decimal(10**3),
-    'ns': Decimal(1),
-}
+NANOSECONDS = {'s': 10**9, 'ms': 10**6, 'us': 10**3, 'ns': 1}
 
 
 @dataclass(frozen=True)
@@ -114,9 +108,7 @@ class InputColumns:
         return [unit in ANGLE_UNITS for unit in self.units] == [False, True]
 
     def by_channel(self) -> Iterator[InputColumns]:
-        """
-        Yield the columns of each channel: of several shafts, one each.
-        """
+        """Yield the columns of each channel: of several shafts, one each."""
         for channels in (SHAFTS, PITCHES):
             if self.channel is channels[0]:
                 for channel, name, unit in zip(channels, self.names, self.units, strict=False):
@@ -315,7 +307,7 @@ BLANKS = ' '
 ROWS = 1 << 10
 """Read at a time."""
 
-_SAMPLE_LINES = 400
+_SAMPLE_LINES, _LOOKED_AT = 400, 10_001  # those that are not blank, of the first
 _LINE = 1 << 20  # characters; no row of a table is as long
 _DATE = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d\d(:\d\d.*)?')
 _KNOWN_UNITS = {*UNITS, *OTHER_UNITS, 'utc', 'hh:mm:ss'}
@@ -330,25 +322,19 @@ Cells = NDArray[Any]
 
 
 def are_numbers(cells: Cells) -> bool:
-    """
-    Say whether a column holds numbers, and no texts.
-    """
+    """Say whether a column holds numbers, and no texts."""
     return cells.dtype.kind in 'fiu'
 
 
 def written(values: NDArray[Any]) -> Cells:
-    """
-    Return the shortest text that reads back as the same value; '' where there is none.
-    """
+    """Return the shortest text that reads back as the same value; '' where there is none."""
     listed = values.tolist()
     texts = ['' if each is None or each != each else str(each).strip() for each in listed]
     return np.array(texts, object)
 
 
 def texts_of(cells: Cells) -> Cells:
-    """
-    Return cells as text.
-    """
+    """Return cells as text."""
     return written(cells) if are_numbers(cells) else cells
 
 
@@ -382,15 +368,11 @@ class TableRows:
         return TableRows(self.lines[chosen], columns, self.beyond)
 
     def texts(self, place: int) -> Cells:
-        """
-        Return the cells (n,) of a column as text.
-        """
+        """Return the cells (n,) of a column as text."""
         return texts_of(self.columns[place])
 
     def joined(self, places: Sequence[int]) -> Cells:
-        """
-        Return the cells (n,) of one column, or the text of two: a date and its time of day.
-        """
+        """Return the cells (n,) of one column, or the text of two: a date and its time of day."""
         if len(places) == 1:
             return self.columns[places[0]]
         joined = np.full(len(self), '', object)
@@ -455,22 +437,16 @@ class LogTable:
     def _first_lines(self) -> list[tuple[int, str]]:
         """Return the first lines that are not blank, with their numbers."""
         blank = DELIMITERS + ' \r\n'
-        found = []
+        numbered = islice(enumerate(self._lines(), start=1), _LOOKED_AT)
         try:
-            for number, line in enumerate(self._lines(), start=1):
-                if line.strip(blank).strip():
-                    found.append((number, line))
-                if len(found) >= _SAMPLE_LINES or number > 10_000:
-                    break
+            filled = ((number, line) for number, line in numbered if line.strip(blank).strip())
+            return list(islice(filled, _SAMPLE_LINES))
         except OSError as error:
             why = error.strerror or error
             raise self.error(f' cannot be read: {why}; give a CSV file') from error
-        return found
 
     def error(self, text: str) -> ImportDataError:
-        """
-        Return an error of the table, which names its file.
-        """
+        """Return an error of the table, which names its file."""
         return ImportDataError(f'{str(self.path)!r}{text}')
 
     def _layout(self, lines: Sequence[str]) -> tuple[int, str, Sequence[str]]:
@@ -516,9 +492,7 @@ class LogTable:
         raise self.error(f' has no column {name!r}; it has {listed}, {hint}')
 
     def columns(self, names: Iterable[str]) -> list[int]:
-        """
-        Return the places of columns given by names or numbers.
-        """
+        """Return the places of columns given by names or numbers."""
         return [self.column(name) for name in names]
 
     def key(self, place: int) -> str:
@@ -554,9 +528,7 @@ class LogTable:
             yield self._by_column(some)
 
     def first_rows(self, most: int) -> TableRows:
-        """
-        Return the first rows.
-        """
+        """Return the first rows."""
         return next(self.rows(most=most), self._by_column([]))
 
     def _by_column(self, rows: Sequence[LogRow]) -> TableRows:
@@ -666,9 +638,7 @@ class Numbers:
     values: Float64
 
     def column(self, name: str) -> Float64:
-        """
-        Return (n,) values of a column that is there.
-        """
+        """Return (n,) values of a column that is there."""
         return self.values[:, self.names.index(name)]
 
 
