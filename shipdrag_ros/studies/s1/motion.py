@@ -345,7 +345,8 @@ class PolynomialMotion:
         time = self.scale.normalise(time_ns)
         order = len(self.coefficients)
         rows = self.basis.evaluate(time, derivatives=derivative, order=order)[derivative]
-        return np.einsum('k,km->m', self.coefficients, rows) / self.scale.half_s**derivative
+        fitted: Float64 = np.einsum('k,km->m', self.coefficients, rows)
+        return fitted / self.scale.half_s**derivative
 
     def motion(self, time: Float64) -> Motion:
         """

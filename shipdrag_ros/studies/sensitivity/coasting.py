@@ -215,7 +215,7 @@ def coast_from(ship: Ship, speed_m_s: float | None = None) -> Coast:
     SensitivityError
         If it is not within the baseline, or too low to slow down from.
     """
-    low, high = slowest_m_s(ship), ship.baseline_range_m_s[1]
+    low, high = _slowest_m_s(ship), ship.baseline_range_m_s[1]
     speed = SPEED_FRACTION * high if speed_m_s is None else speed_m_s
     # written so that NaN fails
     if not low <= speed <= high:
@@ -235,10 +235,8 @@ def coast_from(ship: Ship, speed_m_s: float | None = None) -> Coast:
     return Coast(scenario, np.concatenate([steady, coasting]))
 
 
-def slowest_m_s(ship: Ship) -> float:
-    """
-    Return the lowest speed that a coastdown may begin at.
-    """
+def _slowest_m_s(ship: Ship) -> float:
+    """Return the lowest speed that a coastdown may begin at."""
     low = ship.baseline_range_m_s[0]
     return max(_ABOVE * low, float(ship.speed(FROUDE_MIN))) / _LEAST
 
@@ -555,7 +553,7 @@ def _check(
     signs = np.where(shift < 0.0, -1.0, 1.0)
     dropped = [one.key in selection.dropped for one in listed]
     factors = np.where(dropped, 1.0 + CHANGES[0] * signs, 1.0)
-    other = coast_from(ship, max(_CHECK_FRACTION * coast.scenario.speed_m_s, slowest_m_s(ship)))
+    other = coast_from(ship, max(_CHECK_FRACTION * coast.scenario.speed_m_s, _slowest_m_s(ship)))
     wrong = _reading(_changed(ship, listed, factors), other) - _reading(ship, other)
     rms = np.sqrt(np.mean(wrong[other.after_stop] ** 2, axis=0))
     return CoastCheck(other, float(rms[0]) * LOG_SD_M_S, float(rms[1]) * POSITION_SD_M)

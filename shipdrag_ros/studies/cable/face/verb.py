@@ -179,17 +179,17 @@ def shown(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Present
         yield _COEFFICIENT, coefficient_picture(cable), measured
 
     tables = (
-        ('Figures of the cable', facts(cable, tangent, tolerance)),
-        ('Errors of the lines: each over the drag, less one', errors(tangent, tolerance)),
+        ('Figures of the cable', _facts(cable, tangent, tolerance)),
+        ('Errors of the lines: each over the drag, less one', _errors(tangent, tolerance)),
     )
     area = tangent.drag.drag_area_m2
     on_a_ship = f'On a ship: shipdrag simulate --effect towed_cable={area:.6g} ...'
     return Presentation(
         'Drag of a towed cable, and a line in place of it',
-        sentence(cable, tangent, tolerance),
+        _sentence(cable, tangent, tolerance),
         [
             Section(_LINES, tables=tables),
-            Section('Before it is used', lines=(*notes(cable), on_a_ship)),
+            Section('Before it is used', lines=(*_notes(cable), on_a_ship)),
             Section(_COEFFICIENT),
         ],
         pictures(),
@@ -197,10 +197,8 @@ def shown(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Present
     )
 
 
-def sentence(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> str:
-    """
-    Say what the drag is, which line may replace it, and where.
-    """
+def _sentence(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> str:
+    """Say what the drag is, which line may replace it, and where."""
     is_known = isinstance(cable.drag, drag.CableSurface)
     kind = f'{cable.drag} cable' if is_known else 'cable with a stated C0'
     low, high = drag.tangent_range(tolerance)
@@ -216,10 +214,8 @@ def sentence(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> str:
     )
 
 
-def facts(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Table:
-    """
-    Show the figures of a cable.
-    """
+def _facts(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Table:
+    """Show the figures of a cable."""
     low, high = drag.tangent_range(tolerance)
     v0, percent = tangent.speed_m_s, f'{100.0 * tolerance:.3g} %'
     return Table(
@@ -238,10 +234,8 @@ def facts(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Table:
     )
 
 
-def errors(tangent: drag.Tangent, tolerance: float) -> Table:
-    """
-    Show what the lines err at speeds about V0.
-    """
+def _errors(tangent: drag.Tangent, tolerance: float) -> Table:
+    """Show what the lines err at speeds about V0."""
     u, naive, touching = drag.compare_errors(tangent.speed_m_s, tolerance).T
     return by_columns(
         {
@@ -253,10 +247,8 @@ def errors(tangent: drag.Tangent, tolerance: float) -> Table:
     )
 
 
-def notes(cable: drag.Cable) -> tuple[str, ...]:
-    """
-    Say what has to be known before the figures are used.
-    """
+def _notes(cable: drag.Cable) -> tuple[str, ...]:
+    """Say what has to be known before the figures are used."""
     low, high = drag.PUBLISHED_RANGE
     at_low, at_high = (f'{100.0 * each:.1f} %' for each in drag.tangent_error((low, high)))
     return (

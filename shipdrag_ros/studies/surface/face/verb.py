@@ -160,7 +160,7 @@ def run(options: argparse.Namespace) -> int:
     if options.export is not None:
         options.export.write_text(found.source(target), encoding='utf-8')
         output.log(f'function in {options.export}')
-    content = document(found)
+    content = _document(found)
     if asked is not None:
         slopes = found.polynomial.gradient(asked)
         content['predictions'] = [
@@ -171,10 +171,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def document(found: Surface) -> dict[str, Any]:
-    """
-    Return the document of a surface.
-    """
+def _document(found: Surface) -> dict[str, Any]:
+    """Return the document of a surface."""
     table = found.table
     tried = (table.coefficients, table.sse, np.sqrt(table.variance), table.f, table.p)
     terms = (found.polynomial.powers, found.coefficients, found.sd)
