@@ -349,10 +349,9 @@ def worth(expression: str, names: Mapping[str, Float64 | float]) -> Float64:
     names
         Of parameters and of `NAMES`, those that it holds.
     """
+    known = {name: np.asarray(value, np.float64) for name, value in names.items()}
     with np.errstate(all='ignore'):
-        found = Formula.parse(expression).walk(
-            Values(), {name: np.asarray(value, np.float64) for name, value in names.items()}
-        )
+        found = Formula.parse(expression).walk(Values(), known)
     # far outside of what is probable a fit may try anything
     if np.isfinite(found).all():
         return found

@@ -20,17 +20,9 @@ from shipdrag_ros.samples import Float64
 
 LONGEST, MOST_NODES, DEEPEST = 400, 120, 30
 """Characters, parts and levels of a formula that is read."""
-FUNCTIONS = {
-    'step': 2,
-    'min': 2,
-    'max': 2,
-    'abs': 1,
-    'exp': 1,
-    'tanh': 1,
-    'sqrt': 1,
-    'cos': 1,
-    'sin': 1,
-}
+FUNCTIONS = dict.fromkeys(('step', 'min', 'max'), 2) | (
+    dict.fromkeys(('abs', 'exp', 'tanh', 'sqrt', 'cos', 'sin'), 1)
+)
 """What may be called, with how many arguments; step(x, w) grows from 0 to 1 about x = 0."""
 _LARGEST = 1e12  # number in a formula, or exponent times what it is of
 _OVERFLOW = 1e30
@@ -48,23 +40,18 @@ class Algebra(Protocol[T]):
 
     def number(self, value: float) -> T:
         """Return a number."""
-        ...
 
     def binary(self, operator: str, left: T, right: T) -> T:
         """Return left + - * / right."""
-        ...
 
     def power(self, base: T, exponent: float) -> T:
         """Return a power whose exponent is a number."""
-        ...
 
     def power_of(self, base: T, exponent: T) -> T:
         """Return a power whose exponent is not."""
-        ...
 
     def call(self, name: str, values: list[T]) -> T:
         """Return a function of the list."""
-        ...
 
 
 _Walk = Callable[[Any, Mapping[str, Any]], Any]
@@ -101,11 +88,9 @@ class Formula:
             If it is too long or too deep, or holds anything but the list.
         """
         tree = _tree(text)
-        nodes = list(ast.walk(tree))
-        if len(nodes) > 3 * MOST_NODES:
+        if len([*ast.walk(tree)]) > 3 * MOST_NODES:
             raise FormulaError(f'has more than {MOST_NODES} parts; write a shorter one')
-        names = _check(tree, 0)
-        return cls(text, tuple(sorted(names)), _walked(tree))
+        return cls(text, tuple(sorted(_check(tree, 0))), _walked(tree))
 
     def walk(self, algebra: Algebra[T], names: Mapping[str, T]) -> T:
         """

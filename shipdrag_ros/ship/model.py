@@ -67,25 +67,15 @@ SLENDERNESS_MERCHANT_TRUSTED = (4.5, 7.0)
 _FROUDE = np.linspace(0.0, 0.4, 41)  # of displacement ships, for the sign of n_r
 ROPES = (0.01, 0.04)  # C0 of towed ropes in practice
 USUAL_FORM_FACTOR = 0.2  # where the baseline is a table
-_FRESH, _SEA = 999.0, 1026.0  # kg/m^3 at 15 degrees
 
 
-def slenderness(length_m: float, displaced_volume_m3: float) -> float:
-    """
-    Return L / V^(1/3).
-    """
-    return length_m / float(np.cbrt(displaced_volume_m3))
-
-
-def inconsistencies(values: Mapping[str, Any]) -> Iterator[str]:
-    """
-    Check valid top-level values; those that are missing are not used.
-    """
+def _inconsistencies(values: Mapping[str, Any]) -> Iterator[str]:
+    """Check valid top-level values; those that are missing are not used."""
     length, volume = values.get('length_m'), values.get('displaced_volume_m3')
     yield from _section_lengths(values)
     if length is None or volume is None:
         return
-    psi = slenderness(length, volume)
+    psi = length / float(np.cbrt(volume))
     if not SLENDERNESS[0] <= psi <= SLENDERNESS[1]:
         yield (
             f'length_m: {length!r} beside displaced_volume_m3: {volume!r} gives '
@@ -120,10 +110,8 @@ def _proportions(values: Mapping[str, Any], length: float, volume: float) -> Ite
     surface = values.get('wetted_surface_m2')
     air, propeller = values.get('air'), values.get('propeller')
     if breadth is not None and not 1.0 <= length / breadth <= 20.0:
-        yield (
-            f'breadth_m: {breadth!r} beside length_m: {length!r}, expected '
-            f'{length / 20:.3g}..{length:.3g} m'
-        )
+        expected = f'{length / 20:.3g}..{length:.3g} m'
+        yield f'breadth_m: {breadth!r} beside length_m: {length!r}, expected {expected}'
     if breadth is not None and draught is not None:
         block = volume / (length * breadth * draught)
         if not 0.3 <= block <= 1.0:
@@ -133,12 +121,10 @@ def _proportions(values: Mapping[str, Any], length: float, volume: float) -> Ite
                 'expected 0.3..1 (hull without keel fin; the hulls of a catamaran together)'
             )
     if surface is not None:
-        usual = usual_wetted_surface_m2(length, volume)
+        usual = _usual_wetted_surface_m2(length, volume)
         if not 0.5 <= surface / usual <= 2.0:
-            yield (
-                f'wetted_surface_m2: {surface!r}, expected {usual / 2:.4g}..{2 * usual:.4g} m^2 '
-                f'for this length and volume'
-            )
+            expected = f'{usual / 2:.4g}..{2 * usual:.4g} m^2 for this length and volume'
+            yield f'wetted_surface_m2: {surface!r}, expected {expected}'
     if air is not None and air.frontal_area_m2 > length**2:
         yield (
             f'air.frontal_area_m2: {air.frontal_area_m2!r}, expected less than the square of '
@@ -150,19 +136,17 @@ def _proportions(values: Mapping[str, Any], length: float, volume: float) -> Ite
 
 def _section_lengths(values: Mapping[str, Any]) -> Iterator[str]:
     base = values.get('baseline')
-    if isinstance(base, CoefficientBaseline):
-        pairs = ('wave_froude', base.wave_froude), ('wave_coefficient', base.wave_coefficient)
-    elif isinstance(base, TableBaseline):
-        pairs = ('speed_m_s', base.speed_m_s), ('resistance_n', base.resistance_n)
-    else:
+    if base is None:
         return
-    (name, points), (name_of_values, table) = pairs
+    is_table = isinstance(base, TableBaseline)
+    names = ('speed_m_s', 'resistance_n') if is_table else ('wave_froude', 'wave_coefficient')
+    points, table = (getattr(base, name) for name in names)
     if len(points) != len(table):
         yield (
-            f'baseline.{name_of_values}: {len(table)} values, expected {len(points)}, '
-            f'one for each of {name}'
+            f'baseline.{names[1]}: {len(table)} values, expected {len(points)}, '
+            f'one for each of {names[0]}'
         )
-    elif points[0] == 0.0 and isinstance(base, TableBaseline) and table[0] != 0.0:
+    elif is_table and points[0] == 0.0 and table[0] != 0.0:
         yield f'baseline.resistance_n[0]: {table[0]!r} at rest, expected 0'
 
 
@@ -172,11 +156,11 @@ def _baseline(values: Mapping[str, Any], length: float, volume: float) -> Iterat
     if isinstance(base, CoefficientBaseline) and surface is None:
         yield (
             'wetted_surface_m2: missing, the coefficients of the baseline are on it; about '
-            f'{usual_wetted_surface_m2(length, volume):.3g} m^2 is usual for this hull'
+            f'{_usual_wetted_surface_m2(length, volume):.3g} m^2 is usual for this hull'
         )
     if isinstance(base, TableBaseline) and 'water' in values:
         top, force = base.speed_m_s[-1], base.resistance_n[-1]
-        area = surface or usual_wetted_surface_m2(length, volume)
+        area = surface or _usual_wetted_surface_m2(length, volume)
         total = force / (0.5 * values['water'].density_kg_m3 * area * top**2)
         if not 1e-5 <= total <= 0.5:
             yield (
@@ -185,14 +169,8 @@ def _baseline(values: Mapping[str, Any], length: float, volume: float) -> Iterat
             )
 
 
-def usual_wetted_surface_m2(length_m: float, displaced_volume_m3: float) -> float:
-    """
-    Return the wetted surface [m^2] that such a hull usually has.
-
-    Notes
-    -----
-    Taylor: S = C sqrt(V L), C about 2.6 for ship forms.
-    """
+def _usual_wetted_surface_m2(length_m: float, displaced_volume_m3: float) -> float:
+    """Return the wetted surface that such a hull usually has, C sqrt(V L) after Taylor."""
     return 2.6 * float(np.sqrt(displaced_volume_m3 * length_m))
 
 
@@ -253,17 +231,17 @@ class Ship:
 
     def __post_init__(self) -> None:
         # particulars that are varied may leave what is plausible of a file, never what can be
+        given = {name: getattr(self, name) for name in _SIZES if getattr(self, name) is not None}
         problems = [
             f'{name}: {value!r}, expected a number above 0'
-            for name in _SIZES
-            if (value := getattr(self, name)) is not None and not 0.0 < value < np.inf
+            for name, value in given.items()
+            if not 0.0 < value < np.inf
         ]
         if problems:
             raise ShipFileError('Ship(...)', problems)
         # whole numbers, and those of numpy, become floats: what is compiled takes no other
-        for name in _SIZES:
-            if (value := getattr(self, name)) is not None:
-                object.__setattr__(self, name, float(value))
+        for name, value in given.items():
+            object.__setattr__(self, name, float(value))
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Ship:
@@ -363,7 +341,7 @@ class Ship:
             for name, key in keys.items()
             if name not in given and key.default is not MISSING
         }
-        problems.extend(inconsistencies({**defaults, **accepted}))
+        problems.extend(_inconsistencies({**defaults, **accepted}))
         if problems:
             raise ShipFileError(subject, problems)
         return cls(**accepted)
@@ -382,7 +360,7 @@ class Ship:
     @property
     def slenderness(self) -> float:
         """L / V^(1/3)."""
-        return slenderness(self.length_m, self.displaced_volume_m3)
+        return self.length_m / float(np.cbrt(self.displaced_volume_m3))
 
     def summary(self) -> str:
         """
@@ -574,7 +552,7 @@ def surface_m2(ship: Ship) -> float:
     """
     Return the wetted surface, the usual one of her length and volume where none is stated.
     """
-    return ship.wetted_surface_m2 or usual_wetted_surface_m2(
+    return ship.wetted_surface_m2 or _usual_wetted_surface_m2(
         ship.length_m, ship.displaced_volume_m3
     )
 
@@ -665,21 +643,19 @@ class RunSheet:
         ShipFileError
             If what is overridden does not fit the rest of the ship file.
         """
-        water = ship.water
-        if self.water is not None:
-            density = self.water.density_kg_m3 or self.water.density or ship.water.density_kg_m3
-            viscosity = ship.water.kinematic_viscosity_m2_s
-            if self.water.temperature_c is not None:
-                viscosity = kinematic_viscosity(self.water.temperature_c, density)
-            water = replace(ship.water, density_kg_m3=density, kinematic_viscosity_m2_s=viscosity)
+        mine, density = self.water or RunWater(), ship.water.density_kg_m3
+        density = mine.density_kg_m3 or mine.density or density
+        viscosity = ship.water.kinematic_viscosity_m2_s
+        if mine.temperature_c is not None:
+            viscosity = kinematic_viscosity(mine.temperature_c, density)
         changed = replace(
             ship,
             draught_m=self.draught_m or ship.draught_m,
             displaced_volume_m3=self.displaced_volume_m3 or ship.displaced_volume_m3,
-            water=water,
+            water=Water(density_kg_m3=density, kinematic_viscosity_m2_s=viscosity),
             facts=overriding(ship.facts, self.facts, facts),
         )
-        problems = list(inconsistencies({name: getattr(changed, name) for name in keys_of(Ship)}))
+        problems = list(_inconsistencies({name: getattr(changed, name) for name in keys_of(Ship)}))
         if problems:
             raise ShipFileError(subject, problems)
         return changed
@@ -708,4 +684,5 @@ def kinematic_viscosity(temperature_c: float, density_kg_m3: float) -> float:
     """
     fresh = (0.000585 * (temperature_c - 12.0) - 0.03361) * (temperature_c - 12.0) + 1.2350
     sea = (0.000659 * (temperature_c - 1.0) - 0.05076) * (temperature_c - 1.0) + 1.7688
-    return 1e-6 * float(np.interp(density_kg_m3, (_FRESH, _SEA), (fresh, sea)))
+    # by the densities of both at 15 degrees
+    return 1e-6 * float(np.interp(density_kg_m3, (999.0, 1026.0), (fresh, sea)))

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -179,11 +179,11 @@ def added_mass() -> Kind:
 
     def read(value: object, path: str, problems: Problems) -> object:
         model = value.get('model') if isinstance(value, dict) else None
-        if not isinstance(model, str) or model not in _MODELS:
-            shown = f'.model: {show(model)}' if isinstance(value, dict) else f': {show(value)}'
-            problems.append(f'{path}{shown}, expected model: {expectation}')
-            return INVALID
-        return section(_MODELS[model]).read(value, path, problems)
+        if isinstance(model, str) and model in _MODELS:
+            return section(_MODELS[model]).read(value, path, problems)
+        shown = f'.model: {show(model)}' if isinstance(value, dict) else f': {show(value)}'
+        problems.append(f'{path}{shown}, expected model: {expectation}')
+        return INVALID
 
     return Kind(read, f'a model: {expectation}')
 
@@ -196,10 +196,9 @@ def n_r_polynomial(model: AddedMass, slenderness: float) -> Float64:
     -----
     S1 (2). Written with the Froude number, sqrt(g L) drops out of its b.
     """
-    return np.array(
-        [sum(c * slenderness**power for power, c in enumerate(row)) for row in model.coefficients],
-        np.float64,
-    )
+    rows = model.coefficients
+    found = [sum(c * slenderness**power for power, c in enumerate(row)) for row in rows]
+    return np.array(found, np.float64)
 
 
 NO_CLEAN_HULL = (
@@ -258,12 +257,6 @@ class CoefficientBaseline:
     run_scatter: float = _SCATTER
     source: str = declare(text(), 'where the figures come from', default='')
 
-    @cached_property
-    def _wave(self) -> Any:
-        from scipy.interpolate import PchipInterpolator  # slow to import
-
-        return PchipInterpolator(self.wave_froude, self.wave_coefficient)
-
     def wave(self, froude: Float64) -> Float64:
         """
         Return C_W at Froude numbers >= 0.
@@ -273,7 +266,8 @@ class CoefficientBaseline:
         ShipdragError
             Outside the table.
         """
-        return _inside(self._wave, froude, 'baseline.wave_froude', self.wave_froude, '')
+        points, values = self.wave_froude, self.wave_coefficient
+        return _inside(points, values, froude, 'baseline.wave_froude', '')
 
     def viscous(self, reynolds: Float64) -> Float64:
         """
@@ -299,12 +293,6 @@ class TableBaseline:
     run_scatter: float = _SCATTER
     source: str = declare(text(), 'where the figures come from', default='')
 
-    @cached_property
-    def _resistance(self) -> Any:
-        from scipy.interpolate import PchipInterpolator  # slow to import
-
-        return PchipInterpolator(self.speed_m_s, self.resistance_n)
-
     def resistance(self, speed: Float64) -> Float64:
         """
         Return the resistance [N] at speeds >= 0 [m/s].
@@ -314,8 +302,7 @@ class TableBaseline:
         ShipdragError
             Outside the table.
         """
-        table = self.speed_m_s
-        return _inside(self._resistance, speed, 'baseline.speed_m_s', table, ' m/s')
+        return _inside(self.speed_m_s, self.resistance_n, speed, 'baseline.speed_m_s', ' m/s')
 
 
 Baseline = CoefficientBaseline | TableBaseline
@@ -345,11 +332,20 @@ def ittc57(reynolds: Float64) -> Float64:
     return 0.075 / (np.log10(np.maximum(reynolds, REYNOLDS_MIN)) - 2.0) ** 2
 
 
-def _inside(table: Any, at: Float64, key: str, points: tuple[float, ...], unit: str) -> Float64:
+@lru_cache(64)
+def _curve(points: tuple[float, ...], values: tuple[float, ...]) -> Any:
+    from scipy.interpolate import PchipInterpolator  # slow to import
+
+    return PchipInterpolator(points, values)
+
+
+def _inside(
+    points: tuple[float, ...], values: tuple[float, ...], at: Float64, key: str, unit: str
+) -> Float64:
     # the last digit of a Froude number made from a speed may lie outside
     near = np.clip(at, points[0], points[-1])
     outside = ~(np.abs(at - near) <= 1e-12 * points[-1])
-    result: Float64 = table(near)
+    result: Float64 = _curve(points, values)(near)
     if np.any(outside):
         worst = float(np.asarray(at)[outside].flat[0])
         raise ShipdragError(

@@ -190,11 +190,7 @@ def _boxes(term: DeclaredTerm, names: Collection[str]) -> dict[str, Range]:
 
 
 def _refuse_mixed(term: DeclaredTerm, channel: str, formula: Formula, most: float) -> None:
-    """
-    Expect what can be simulated, of a size that can be.
-
-    A force in time goes as the square of the speed, and water gains evenly in time.
-    """
+    """Expect what can be simulated, of a size that can be."""
     low, high = term.term.valid.get('u', (0.5, 8.0))
     speed = np.linspace(max(low, 0.05 * high), high, 7)
     last = term.term.valid.get('t', (0.0, 1e3))[1]
@@ -208,6 +204,7 @@ def _refuse_mixed(term: DeclaredTerm, channel: str, formula: Formula, most: floa
         if (largest := float(np.abs(rows).max())) > most:
             wrong = f'is {largest:.2g} in SI on a ship of 100 m, at most {most:.2g} can be'
             raise FormulaError(wrong)
+    # a force in time goes as the square of the speed, and water gains evenly in time
     over = rows / speed**2
     force_in_time = channel == 'force' and 't' in formula.names
     if force_in_time and np.any(np.ptp(over, axis=1) > _ALIKE * np.abs(over).max(axis=1)):
@@ -349,9 +346,8 @@ class LearntTerm(DeclaredTerm):
 def _is_covariance(matrix: Float64) -> bool:
     """Say whether it is symmetric, and no variance of a sum negative by more than rounding."""
     variance = np.diag(matrix)
-    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=0.0):
-        return False
-    if np.any(variance < 0.0) or np.any(matrix[variance == 0.0] != 0.0):
+    is_symmetric = np.allclose(matrix, matrix.T, rtol=1e-6, atol=0.0)
+    if not is_symmetric or variance.min() < 0.0 or matrix[variance == 0.0].any():
         return False
     scale = 1.0 / np.sqrt(np.where(variance > 0.0, variance, 1.0))
     return bool(np.linalg.eigvalsh(matrix * np.outer(scale, scale)).min() > -_ROUNDING)

@@ -180,9 +180,8 @@ def simulate_columns(
             moved = np.hypot(path[:, 3], path[:, 4])
             over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))
     radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
-    return Columns(
-        time, speed, position, velocity, log, radar[:, :, None] * position, radar * over_ground
-    )
+    read = radar[:, :, None] * position, radar * over_ground
+    return Columns(time, speed, position, velocity, log, *read)
 
 
 def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
@@ -218,11 +217,10 @@ def _prepare(
         if action.turns not in places:
             of_column = acted(scenario, action) if action.turns else scenario
             edges = edges_of(of_column, also_s=also)
-            steps = (
-                _steps(ship, of_column, edges, longest)
-                if step_s is None
-                else steps_of(ship, of_column, edges, step_s=step_s)
-            )
+            if step_s is None:
+                steps = _steps(ship, of_column, edges, longest)
+            else:
+                steps = steps_of(ship, of_column, edges, step_s=step_s)
             first = sum(map(len, legs))
             legs.append(legs_of(ship, of_column, edges, steps))
             places[action.turns] = first, first + len(steps)
@@ -234,14 +232,9 @@ def _prepare(
     ]
     once = np.unique(motion, return_index=True)[1]
     moving = [actions[i] for i in once]
-    return _Prepared(
-        np.array(motion),
-        law,
-        records[once],
-        extra_of(ship, law, moving),
-        np.concatenate(legs),
-        np.array([places[action.turns] for action in moving]),
-    )
+    own_legs = np.array([places[action.turns] for action in moving])
+    extra = extra_of(ship, law, moving)
+    return _Prepared(np.array(motion), law, records[once], extra, np.concatenate(legs), own_legs)
 
 
 def _also_s(

@@ -32,9 +32,7 @@ _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its f
 _SCALES = {scale.text: scale for scale in effect.SCALES}
 _NEEDS = {'B_WL': 'breadth_m', 'T_M': 'draught_m', 'D_P': 'propeller'}
 _ERRS_IN = {
-    'log': ('speed_through_water',),
-    'clock': ('speed_through_water',),
-    'filter': ('speed_through_water',),
+    **dict.fromkeys(('log', 'clock', 'filter'), ('speed_through_water',)),
     'ground': ('position', 'speed_over_ground'),
 }
 
@@ -66,9 +64,8 @@ def stated(name: str, act: Callable[..., Action]) -> effect.Effect:
     """
     entry = _of_modules()[name]
     of_effect, problems = keys_of(effect.Effect), list[str]()
-    more = read_keys(
-        of_effect, {key: entry[key] for key in entry if key in of_effect}, name, problems
-    )
+    given = {key: entry[key] for key in entry if key in of_effect}
+    more = read_keys(of_effect, given, name, problems)
     if problems:
         raise EffectFileError(name, problems)
     return effect.Effect(
@@ -84,9 +81,8 @@ def stated(name: str, act: Callable[..., Action]) -> effect.Effect:
 @cache
 def _of_modules() -> dict[str, Any]:
     file = resources.files('shipdrag_ros') / 'data' / 'effects_of_modules.yaml'
-    content = file.read_text(encoding='utf-8')
-    found: dict[str, Any] = parse(content, subject=file.name, error=EffectFileError)
-    return found
+    text = file.read_text(encoding='utf-8')
+    return dict(parse(text, subject=file.name, error=EffectFileError))
 
 
 def _stated(name: str, about: Mapping[str, Any]) -> Parameter:
@@ -167,11 +163,7 @@ def _deep_n(ship: Ship, speed_m_s: Float64) -> Float64:
     return ship.resistance_n(speed_m_s) - ship.air_drag_n(speed_m_s)
 
 
-_BY_SPEED: Mapping[str, Callable[[Ship, Float64], Float64]] = {
-    'R_T': _deep_n,
-    'R_V': viscous_n,
-    'R_F': friction_n,
-}
+_BY_SPEED = {'R_T': _deep_n, 'R_V': viscous_n, 'R_F': friction_n}
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,13 +221,11 @@ class _Acting:
 
 
 def _act(term: LearntTerm, frame: effect.Frame, *values: float) -> Action:
-    parts = zip(term.parts, term.units, strict=True)
-    return Action.total(
-        *(
-            _action(part, _Acting(part.expression, term, frame, values), unit == PURE)
-            for part, unit in parts
-        )
+    actions = (
+        _action(part, _Acting(part.expression, term, frame, values), unit == PURE)
+        for part, unit in zip(term.parts, term.units, strict=True)
     )
+    return Action.total(*actions)
 
 
 def _action(part: TermPart, acting: _Acting, is_share: bool) -> Action:
@@ -258,9 +248,16 @@ def _action(part: TermPart, acting: _Acting, is_share: bool) -> Action:
             return Action(n_r_change=amount)
         case 'inertia':
             return Action(mass_fraction=amount / acting.frame.ship.mass_kg)
+        case 'ground':
+            return Action(radar_factor=amount)
+        case 'clock':
+            return Action(log_late_s=amount)
+        case 'filter':
+            return Action(log_lag_s=amount)
+        case 'shaft':
+            return Action(stall_m_s=amount)
         case _:
-            field: dict[str, Any] = {_FIELDS[part.channel]: amount}
-            return Action(**field)
+            return Action(depth_m=amount)
 
 
 def _moved(part: TermPart, acting: _Acting) -> Action:
@@ -275,15 +272,6 @@ def _moved(part: TermPart, acting: _Acting) -> Action:
         current_m_s=frame.earth(*at_stop.tolist()),
         current_change_m_s=frame.earth(*(at_end - at_stop).tolist()),
     )
-
-
-_FIELDS = {
-    'ground': 'radar_factor',
-    'clock': 'log_late_s',
-    'filter': 'log_lag_s',
-    'shaft': 'stall_m_s',
-    'depth': 'depth_m',
-}
 
 
 def _in_time(acting: _Acting) -> tuple[Turn, ...]:

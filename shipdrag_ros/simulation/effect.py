@@ -41,8 +41,6 @@ from shipdrag_ros.samples import INPUTS, Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation.scenario import Scenario, Turn
 
-ResistanceLaw = Callable[[Float64], Float64]
-ReadingError = Callable[[Float64, Float64], Float64]
 Vector = tuple[float, float]
 
 
@@ -366,7 +364,7 @@ class Action:
         Time constant of a first-order filter of the speed over ground.
     """
 
-    resistance: tuple[ResistanceLaw, ...] = ()
+    resistance: tuple[Callable[[Float64], Float64], ...] = ()
     wind_m_s: Vector = (0.0, 0.0)
     wave_force_n: Vector = (0.0, 0.0)
     wave_encounter_s_m: float = 0.0
@@ -386,7 +384,7 @@ class Action:
     log_offset_m_s: float = 0.0
     log_lag_s: float = 0.0
     log_late_s: float = 0.0
-    log_error: tuple[ReadingError, ...] = ()
+    log_error: tuple[Callable[[Float64, Float64], Float64], ...] = ()
     radar_factor: float = 0.0
     ground_lag_s: float = 0.0
 
@@ -414,22 +412,17 @@ class Action:
         Return the extra resistance [N], odd in the speed.
         """
         speed = np.asarray(speed_m_s, np.float64)
-        magnitude = np.abs(speed)
-        total = np.zeros_like(speed)
-        for function in self.resistance:
-            total += function(magnitude)
-        return np.sign(speed) * total
+        added = (function(np.abs(speed)) for function in self.resistance)
+        return np.sign(speed) * sum(added, np.zeros_like(speed))
 
 
 def _sum_of_vectors(one: Vector, other: Vector) -> Vector:
     return one[0] + other[0], one[1] + other[1]
 
 
-_ADD: dict[str, Callable[[Any, Any], Any]] = {
-    'wind_m_s': _sum_of_vectors,
-    'wave_force_n': _sum_of_vectors,
-    'current_m_s': _sum_of_vectors,
-    'current_change_m_s': _sum_of_vectors,
+_VECTORS = ('wind_m_s', 'wave_force_n', 'current_m_s', 'current_change_m_s')
+_ADD: Mapping[str, Any] = {
+    **dict.fromkeys(_VECTORS, _sum_of_vectors),
     'stall_m_s': max,
     'depth_m': min,
 }

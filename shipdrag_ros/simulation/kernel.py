@@ -56,19 +56,11 @@ COLUMN = np.dtype([(name, np.float64) for name in _OF_COLUMN])
 
 # a stretch between two events; the thrust that is ordered is a fraction of the steady one,
 # turning_1_m the resistance of turning over u |u|; this and the yaw rate change evenly
-LEG = np.dtype(
-    [
-        ('start_s', np.float64),
-        ('step_s', np.float64),
-        ('steps', np.int64),
-        ('thrust_ordered', np.float64),
-        ('yaw_rad', np.float64),
-        ('yaw_rate_rad_s', np.float64),
-        ('yaw_rate_rad_s2', np.float64),
-        ('turning_1_m', np.float64),
-        ('turning_1_m_s', np.float64),
-    ]
+_OF_LEG = (
+    *('start_s', 'step_s', 'steps', 'thrust_ordered'),
+    *('yaw_rad', 'yaw_rate_rad_s', 'yaw_rate_rad_s2', 'turning_1_m', 'turning_1_m_s'),
 )
+LEG = np.dtype([(name, np.int64 if name == 'steps' else np.float64) for name in _OF_LEG])
 
 Records = NDArray[np.void]
 

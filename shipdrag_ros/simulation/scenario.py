@@ -46,24 +46,13 @@ class GaussMarkov:
         if not 0.0 <= self.sd < np.inf:
             problems.append(f'sd is {self.sd!r}, expected 0 or more')
         if not 0.0 < self.correlation_time_s < np.inf:
-            problems.append(
-                f'correlation_time_s is {self.correlation_time_s!r}, expected more than 0'
-            )
+            time_s = self.correlation_time_s
+            problems.append(f'correlation_time_s is {time_s!r}, expected more than 0')
         return problems
 
     def sample(self, time_s: Float64, rng: np.random.Generator) -> Float64:
         """
-        Draw one realisation at ascending times, even or not.
-
-        Parameters
-        ----------
-        time_s : (n,)
-        rng
-            Source of the n standard normal numbers.
-
-        Returns
-        -------
-        (n,)
+        Draw one realisation (n,) at ascending times (n,), even or not.
         """
         white = rng.standard_normal(len(time_s))
         decay = np.exp(-np.diff(time_s) / self.correlation_time_s)
@@ -273,8 +262,7 @@ class Scenario:
         rates = [(turn.rate_rad_s, turn.drag_area_m2, turn.rudder_rad) for turn in self.turns]
         if not all(map(isfinite, chain(*rates))):
             yield f'turns are {self.turns!r}, expected finite values'
-        for name in ('water_speed', 'gust_force'):
-            noise = getattr(self, name)
+        for name, noise in ('water_speed', self.water_speed), ('gust_force', self.gust_force):
             if noise is not None:
                 yield from (f'{name}: {problem}' for problem in noise.problems())
 

@@ -101,8 +101,6 @@ STANDARD_SD |= {
 }
 STANDARD_INPUTS = ('speed_through_water', 'position', 'heading', 'shaft')
 
-_TWO_COLUMNS = (Channel.POSITION, Channel.WIND_APPARENT)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor:
@@ -224,21 +222,17 @@ def sense(
         problems.append('two sensors of one channel, expected one')
     if problems:
         raise SimulationError('sensors: ' + '; '.join(problems))
-    return in_arrival_order(
-        [
-            _read(truth, sensor, np.random.default_rng([seed, sensor.channel]), start_ns)
-            for sensor in sensors
-        ]
-    )
+    return in_arrival_order([_read(truth, sensor, seed, start_ns) for sensor in sensors])
 
 
-def _read(truth: Truth, sensor: Sensor, rng: np.random.Generator, start_ns: int) -> Block:
+def _read(truth: Truth, sensor: Sensor, seed: int, start_ns: int) -> Block:
+    rng = np.random.default_rng([seed, sensor.channel])
     end_s = truth.time_s[-1]
     time = np.arange(int(end_s * sensor.rate_hz) + 1) / sensor.rate_hz
     time = time[time <= end_s]
     n = len(time)
-    columns = 2 if sensor.channel.kind in _TWO_COLUMNS else 1
     value = _perfect_values(truth, time, sensor.channel)
+    columns = value.shape[1]
     value += sensor.sd * rng.standard_normal((n, columns))
     if sensor.coloured:
         for column in range(columns):
@@ -266,12 +260,9 @@ def _read(truth: Truth, sensor: Sensor, rng: np.random.Generator, start_ns: int)
 
 
 def _perfect_values(whole: Truth, time: Float64, channel: Channel) -> Float64:
-    """
-    Return readings without noise, a new array of one or two columns.
-
-    What is systematically wrong with a sensor is an effect, and acts here on the first of a kind.
-    """
+    """Return readings without noise, a new array of one or two columns."""
     truth, action = whole.at(time), whole.action
+    # what is systematically wrong with a sensor is an effect, and of the first of a kind
     if channel.input in FURTHER:
         channel, action = channel.kind, Action()
     match channel:

@@ -31,10 +31,6 @@ _WINDMILLING = 0.7  # of the shaft speed that drives the ship as fast: no torque
 _QUIET_STEP_S = 1.0  # before the first order or turn nothing happens but the disturbances
 _CELLS = 4000  # of the table of resistance; its error is far below that of any sensor
 _EXTRA_CELLS = 512  # of what effects add to it, which is smooth
-_AS_THEY_ARE = (
-    *('wave_encounter_s_m', 'residual_fraction', 'residual_decay_s'),
-    *('n_r_change', 'mass_fraction'),
-)
 _RANGE = 2.0  # times the steady speed: room for disturbances, and the cells stay fine
 
 
@@ -185,28 +181,12 @@ def simulate(
     gust = _disturbance(scenario.gust_force, time, rng) / ship.mass_kg
 
     path = np.empty((len(time), 5))
-    follow(
-        law,
-        column,
-        extra_of(ship, law, [action])[0],
-        legs_of(ship, scenario, edges, steps),
-        gust,
-        water,
-        time,
-        path,
-    )
-    _check_range(law, time, path[:, 0])
-    return Truth(
-        ship,
-        scenario,
-        time,
-        path[:, 0],
-        path[:, 1:3],
-        path[:, 3:],
-        scenario.heading(time),
-        _shaft_rad_s(ship, scenario, action, time, path[:, 0]),
-        action,
-    )
+    [extra], legs = extra_of(ship, law, [action]), legs_of(ship, scenario, edges, steps)
+    follow(law, column, extra, legs, gust, water, time, path)
+    speed, heading = path[:, 0], scenario.heading(time)
+    _check_range(law, time, speed)
+    shaft = _shaft_rad_s(ship, scenario, action, time, speed)
+    return Truth(ship, scenario, time, speed, path[:, 1:3], path[:, 3:], heading, shaft, action)
 
 
 def own_action(
@@ -250,11 +230,11 @@ def _disturbance(noise: GaussMarkov | None, time: Float64, rng: np.random.Genera
 
 def _check_range(law: SurgeLaw, time: Float64, speed: Float64) -> None:
     is_outside = outside(law, speed)
-    if np.any(is_outside):
+    if is_outside.any():
         i = int(np.argmax(is_outside))
         raise SimulationError(
             f'the speed is {speed[i]:.4g} m/s at {time[i]:.6g} s, the baseline is tabulated for '
-            f'{law.low_m_s:.4g}..{top_m_s(law):.4g} m/s; shorten the record or extend the '
+            f'{law.low_m_s:.4g}..{_top_m_s(law):.4g} m/s; shorten the record or extend the '
             'baseline'
         )
 
@@ -317,10 +297,8 @@ def law_of(ship: Ship, speed_m_s: float) -> SurgeLaw:
     )
 
 
-def top_m_s(law: SurgeLaw) -> float:
-    """
-    Return the highest speed of the table.
-    """
+def _top_m_s(law: SurgeLaw) -> float:
+    """Return the highest speed of the table."""
     return law.low_m_s + law.cell_m_s * len(law.resistance)
 
 
@@ -328,7 +306,7 @@ def outside(law: SurgeLaw, speed_m_s: Float64) -> np.ndarray[tuple[int, ...], np
     """
     Say which speeds the table does not hold; NaN is one.
     """
-    top = top_m_s(law)
+    top = _top_m_s(law)
     margin = 1e-9 * top  # rounding of a steady speed at the very end of the table
     magnitude = np.abs(speed_m_s)
     return ~((magnitude >= law.low_m_s - margin) & (magnitude <= top + margin))
@@ -391,7 +369,8 @@ def columns_of(
         record['change_east_m_s2'] = action.current_change_m_s[0] * per_s
         record['change_north_m_s2'] = action.current_change_m_s[1] * per_s
     records['run_down_s'] = [run_down_s(ship, action) for action in actions]
-    for name in _AS_THEY_ARE:
+    as_they_are = 'wave_encounter_s_m', 'residual_fraction', 'residual_decay_s'
+    for name in (*as_they_are, 'n_r_change', 'mass_fraction'):
         records[name] = [getattr(action, name) for action in actions]
     return records
 

@@ -11,7 +11,6 @@ written down.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -251,15 +250,10 @@ def _history(rng: np.random.Generator, number: int, length_days: float) -> HullH
     """Return a hull's history; what happens to it goes round among the ships."""
     middle = length_days * rng.uniform(0.4, 0.6)
     clean = HullChange(middle, 'cleaning', known=True, keeps=rng.uniform(0.15, 0.35))
-    changes: Sequence[HullChange] = (
-        (clean,),
-        (replace(clean, known=False),),
-        (
-            HullChange(0.5 * middle, 'idle', known=False, adds=rng.uniform(0.10, 0.20)),
-            HullChange(1.3 * middle, 'docking', known=True, keeps=0.0, growth=0.6),
-        ),
-    )[number % 3]
-    return HullHistory(rng.uniform(0.05, 0.30), rng.uniform(0.12, 0.35), tuple(changes))
+    idle = HullChange(0.5 * middle, 'idle', known=False, adds=rng.uniform(0.10, 0.20))
+    docking = HullChange(1.3 * middle, 'docking', known=True, keeps=0.0, growth=0.6)
+    changes = ((clean,), (replace(clean, known=False),), (idle, docking))[number % 3]
+    return HullHistory(rng.uniform(0.05, 0.30), rng.uniform(0.12, 0.35), changes)
 
 
 def _run(
@@ -330,19 +324,17 @@ def _name(number: int) -> str:
 def _scaled(ship: Ship, scale: float, name: str) -> Ship:
     """Return a ship of the same form in another size."""
 
-    def by(value: float | None, power: int) -> float | None:
-        return None if value is None else round(value * scale**power, 3)
-
+    air = ship.air and replace(
+        ship.air, frontal_area_m2=round(ship.air.frontal_area_m2 * scale**2, 1)
+    )
     return replace(
         ship,
         name=name,
         length_m=round(ship.length_m * scale, 3),
         displaced_volume_m3=round(ship.displaced_volume_m3 * scale**3, 1),
-        breadth_m=by(ship.breadth_m, 1),
-        draught_m=by(ship.draught_m, 1),
-        wetted_surface_m2=by(ship.wetted_surface_m2, 2),
-        air=None
-        if ship.air is None
-        else replace(ship.air, frontal_area_m2=round(ship.air.frontal_area_m2 * scale**2, 1)),
+        breadth_m=ship.breadth_m and round(ship.breadth_m * scale, 3),
+        draught_m=ship.draught_m and round(ship.draught_m * scale, 3),
+        wetted_surface_m2=ship.wetted_surface_m2 and round(ship.wetted_surface_m2 * scale**2, 3),
+        air=air,
         effects=(),
     )

@@ -23,6 +23,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from shipdrag_ros.samples import Float64
@@ -225,14 +226,7 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
     factor = triangle(np.column_stack([scaled, residuals]))
     solved += root.T @ (left[:, :rank].T @ factor[:-1, -1])
     residuals = values - scaled @ solved
-    return LinearFit(
-        coefficients=solved / scale,
-        residuals=residuals,
-        scale=scale,
-        singular=singular,
-        directions=directions,
-        rank=rank,
-    )
+    return LinearFit(solved / scale, residuals, scale, singular, directions, rank)
 
 
 SIGNIFICANCE = 0.05  # a step less probable than this by chance counts as a fall of s^2
@@ -314,19 +308,18 @@ class OrderTable:
         """(m,) Probability of such an F by chance; NaN at the first."""
         from scipy.special import fdtrc  # slow to import
 
-        chance = fdtrc(np.diff(self.coefficients), self.freedom[1:], self.f[1:])
-        # the library answers NaN at infinity
-        chance[np.isinf(self.f[1:])] = 0.0
-        return np.concatenate([[np.nan], chance])
+        chance = fdtrc(np.diff(self.coefficients, prepend=0), self.freedom, self.f)
+        chance[np.isinf(self.f)] = 0.0  # the library answers NaN there
+        return np.asarray(chance, np.float64)
 
-    def plateau(self, *, significance: float | None = None) -> int:
+    def plateau(self, *, significance: float = SIGNIFICANCE) -> int:
         """
         Return the row of the smallest fit in the plateau of s^2.
 
         Parameters
         ----------
         significance
-            A step less probable than this counts; `SIGNIFICANCE` where not given.
+            A step less probable than this counts.
 
         Notes
         -----
@@ -335,7 +328,7 @@ class OrderTable:
         `NEIGHBOURS` steps has p < `significance`. s^2 falls where F > 1; the
         test asks for more than chance gives.
         """
-        return int(np.argmax(self._settled(significance or SIGNIFICANCE)))
+        return int(np.argmax(self._settled(significance)))
 
     def plateau_at(self, variance: float) -> int | None:
         """
@@ -373,10 +366,7 @@ class OrderTable:
     def _settled(self, significance: float) -> NDArray[np.bool_]:
         """Say of which fits no significant step follows soon; always so of the last."""
         falls = np.concatenate([self.p[1:] < significance, np.zeros(NEIGHBOURS, np.bool_)])
-        soon: NDArray[np.bool_] = np.any(
-            [falls[i : i + len(self.sse)] for i in range(NEIGHBOURS)], axis=0
-        )
-        return ~soon
+        return ~np.asarray(sliding_window_view(falls, NEIGHBOURS).any(axis=1))
 
 
 def rounding(sum_of_squares: float) -> float:

@@ -232,9 +232,7 @@ class HullState:
             # what weighs nothing says nothing of outliers
             solved = np.flatnonzero(self.weights > _NEGLIGIBLE).tolist()
         self._solve(range(len(self._settings)), log_posterior)
-        self.scatter = float(
-            self.weights @ np.array([scatter for scatter, _, _ in self._settings])
-        )
+        self.scatter = float(self.weights @ np.array([each[0] for each in self._settings]))
 
     def _solve(self, numbers: Sequence[int], log_posterior: Float64) -> None:
         """Solve for some settings, set the weights of all, and the evidence."""
@@ -246,9 +244,7 @@ class HullState:
         self.weights = raw / raw.sum()
 
     def _solve_one(self, number: int) -> float:
-        """Solve for a setting under the present probabilities of outliers; return its log
-        posterior, but for a constant.
-        """
+        """Solve for a setting as outliers are now; return its log posterior but for a constant."""
         runs, (_, *sizes) = self.runs, self._settings[number]
         weight = 1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2
         covariance = self._basis + _wander(runs.years, runs.years, *sizes)
@@ -497,9 +493,8 @@ class OneMore:
         gaps = np.maximum(times[self._places] - before, 1e-6)
         self.years = before + 0.5 * gaps
         self._after = state.steps.carried(times, self.years)
-        self._kinds = np.array(
-            [(-size, DOWN_PER_YEAR) for size in _SIZES] + [(size, UP_PER_YEAR) for size in _SIZES]
-        )
+        down, up = ([-each for each in _SIZES], DOWN_PER_YEAR), (_SIZES, UP_PER_YEAR)
+        self._kinds = np.array([(size, rate) for sizes, rate in (down, up) for size in sizes])
         shape = len(state.weights), len(self._kinds), len(self.years)
         log_odds = np.full(shape, -np.inf)
         self._mean, self._variance = np.zeros(shape), np.zeros(shape)
@@ -532,7 +527,7 @@ class OneMore:
             Since the first run, 0 or later.
         """
         after = self.state.steps.carried(years, self.years)
-        return self._over_all(self.state.level_of(years), after, after)
+        return _mixed(self._parts(self.state.level_of(years), after, after))
 
     def growth_per_year(self) -> Mixture:
         """
@@ -540,22 +535,10 @@ class OneMore:
         """
         end = max(float(self.state.runs.years[-1]), 1e-9)
         up = np.full((1, len(self.years)), 1.0 / end)
-        return self._over_all(self.state.growth_of(), np.zeros_like(up), up)
-
-    def _over_all(self, asked: Functional, down: Float64, up: Float64) -> Mixture:
-        """
-        Return the posterior of functionals, in which a jump counts as stated.
-
-        Parameters
-        ----------
-        asked
-            Of the state without the step.
-        down, up : (k, m)
-            How much a jump at each place counts in each.
-        """
-        return _mixed(self._parts(asked, down, up))
+        return _mixed(self._parts(self.state.growth_of(), np.zeros_like(up), up))
 
     def _parts(self, asked: Functional, down: Float64, up: Float64) -> Iterator[Part]:
+        """Yield functionals, in which a jump at each place counts as `down` or `up` (k, m) say."""
         for number in np.flatnonzero(self._share > _UNLIKELY).tolist():
             value, variance, gain = self.state.given(number, asked)
             yield self._none[number], value, variance
@@ -625,18 +608,15 @@ def search(runs: Runs, known: Steps, growth: Growth) -> Found:
         if probability < _DATED or year in taken:  # two at one time are one
             break
         taken.append(year)
-        state = HullState(
-            runs, reduce(Steps.with_one, taken, known), growth, outlier=state.outlier
-        )
+        steps = reduce(Steps.with_one, taken, known)
+        state = HullState(runs, steps, growth, outlier=state.outlier)
         more = OneMore(state)
     found = []
     least = _SURE
     for year in sorted(taken):
         others = [each for each in taken if each != year]
-        without = HullState(
-            runs, reduce(Steps.with_one, others, known), growth, outlier=state.outlier
-        )
-        one = OneMore(without)
+        steps = reduce(Steps.with_one, others, known)
+        one = OneMore(HullState(runs, steps, growth, outlier=state.outlier))
         near = np.abs(one.years - year) <= _NEAR_YEARS
         found.append(FoundStep(year, float(one.probability[near].sum())))
         if found[-1].probability < least:

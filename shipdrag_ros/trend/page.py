@@ -56,33 +56,25 @@ def fleet_text(
     links
         Where the page of each coastdown is, by bag and start; None where there are none.
     """
-    sections = [
-        display.Section(
-            'Which hull first',
-            tables=((f'{_RANKED} {words.ranked_by(trends)}', words.ranking(trends)),),
-        )
-    ]
+    ranked = (f'{_RANKED} {words.ranked_by(trends)}', words.ranking(trends))
+    sections = [display.Section('Which hull first', tables=(ranked,))]
     for trend in trends:
-        drawn = () if trend.curve is None else (added_resistance(trend),)
         steps = (('Steps in the state of the hull', words.event_table(trend)),)
+        name, lines = trend.series.name or 'a ship without a name', words.lines(trend)
         sections.append(
             display.Section(
-                trend.series.name or 'a ship without a name',
-                entry=trend.series.name or 'a ship without a name',
-                lead=words.lines(trend)[:1],
-                lines=words.lines(trend)[1:],
-                pictures=drawn,
+                name,
+                entry=name,
+                lead=lines[:1],
+                lines=lines[1:],
+                pictures=() if trend.curve is None else (added_resistance(trend),),
                 tables=(*(steps if trend.events else ()), (_RUNS, _runs(trend, links or {}))),
             )
         )
     if skipped:
         table = display.Table(('bag', 'reason'), tuple(skipped))
-        sections.append(
-            display.Section(
-                'Bags that could not be used',
-                tables=(('What the fleet could not use, and why', table),),
-            )
-        )
+        tables = (('What the fleet could not use, and why', table),)
+        sections.append(display.Section('Bags that could not be used', tables=tables))
     sections.append(_HOW)
     return page_text('Trend of the fleet', sections, sentence=_sentence(trends))
 
@@ -114,8 +106,7 @@ def _sentence(trends: Sequence[ShipTrend]) -> str:
     cost = f'; it costs {words.amount(first.costs.usd_per_year)} USD a year' if first.costs else ''
     return (
         f'{first.series.name} first: {words.percent(first.now)} % over the clean hull '
-        'in calm deep water'
-        f'{words.speed_loss(first)}{cost}.'
+        f'in calm deep water{words.speed_loss(first)}{cost}.'
     )
 
 
@@ -173,36 +164,19 @@ def draw_added_resistance(axes: Axes, trend: ShipTrend) -> None:
         day = float(_days(np.array([event.time_ns]))[0])
         axes.axvline(day, color=ORANGE, ls='-' if event.known else '--', lw=1.2)
         text = event.kind.replace('_', ' ') if event.known else 'step found'
-        axes.annotate(
-            text,
-            (day, 1.0),
-            xycoords=('data', 'axes fraction'),
-            rotation=90,
-            va='top',
-            ha='right',
-            fontsize=8,
-        )
+        at, place = (day, 1.0), ('data', 'axes fraction')
+        axes.annotate(text, at, xycoords=place, rotation=90, va='top', ha='right', fontsize=8)
     axes.axhline(0.0, color='#333333', lw=0.8)
     axes.set_ylabel('resistance over the clean hull [%]')
     beyond = len(drawn) - len(shown)
-    axes.set_xlabel(
-        f'date (UTC); {beyond} run(s) of another time are in the list alone'
-        if beyond
-        else 'date (UTC)'
-    )
+    others = f'; {beyond} run(s) of another time are in the list alone' if beyond else ''
+    axes.set_xlabel(f'date (UTC){others}')
     axes.xaxis_date()
     axes.legend(loc='upper left')
 
 
-def coastdown_curve(row: CoastdownRow) -> display.Picture:
-    """
-    Draw the resistance of one coastdown over that of the clean hull.
-
-    Parameters
-    ----------
-    row
-        Of the store's `coastdowns`.
-    """
+def _coastdown_curve(row: CoastdownRow) -> display.Picture:
+    """Draw the resistance of one coastdown over that of the clean hull."""
     known, mass_kg = _known(row), _mass_kg(row)
     unit, name = display.force_unit(mass_kg)
 
@@ -366,9 +340,8 @@ def _facts(row: CoastdownRow) -> display.Table:
         'no estimate, because': row['error'],
         'software': f'shipdrag_ros {row["software_version"]}',
     }
-    return display.Table(
-        ('', ''), tuple((name, str(text)) for name, text in found.items() if text)
-    )
+    stated = tuple((name, str(text)) for name, text in found.items() if text)
+    return display.Table(('', ''), stated)
 
 
 def _curve(row: CoastdownRow) -> list[display.Section]:
@@ -379,11 +352,8 @@ def _curve(row: CoastdownRow) -> list[display.Section]:
     head = ('speed [knots]', 'resistance', 'effective power', 'over the clean hull [%]')
     table = display.Table(head, tuple(_cells(row, int(place)) for place in places))
     caption = 'Resistance and effective power; ± is two standard deviations, of the run alone'
-    return [
-        display.Section(
-            'What she needed', pictures=(coastdown_curve(row),), tables=((caption, table),)
-        )
-    ]
+    drawn, tables = (_coastdown_curve(row),), ((caption, table),)
+    return [display.Section('What she needed', pictures=drawn, tables=tables)]
 
 
 def _verdict(row: CoastdownRow) -> str:

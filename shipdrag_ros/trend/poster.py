@@ -80,11 +80,8 @@ def poster(ship: Ship, rows: Sequence[Mapping[str, Any]]) -> Poster:
         found = [each for row in used if (each := _passage(ship, row, high, low)) is not None]
         if found:
             time, distance, sigma = np.array(found).T
-            steps.append(
-                SpeedStep(
-                    float(high), float(low), len(found), _band(time, sigma), _band(distance, sigma)
-                )
-            )
+            bands = _band(time, sigma), _band(distance, sigma)
+            steps.append(SpeedStep(float(high), float(low), len(found), *bands))
     return Poster(ship, tuple(int(row['time_ns']) for row in used), tuple(steps))
 
 
@@ -136,10 +133,8 @@ def table(found: Poster) -> Table:
                 f'{each.runs}',
             )
         )
-    return Table(
-        ('speed', 'time [min:s] (90 %)', 'way (90 %)', 'time so far', 'way so far', 'runs'),
-        rows=tuple(rows),
-    )
+    head = ('speed', 'time [min:s] (90 %)', 'way (90 %)', 'time so far', 'way so far', 'runs')
+    return Table(head, tuple(rows))
 
 
 def write_poster(path: Path, posters: Sequence[Poster]) -> None:

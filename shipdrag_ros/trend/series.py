@@ -22,9 +22,6 @@ _FEW_SHARE = 0.1  # of all runs: so many may one wrong clock have dated, if ...
 _FAR_NS = 3.0 * YEAR_NS  # ... they are so far off; a second season is nearer
 _EARLIEST_NS = 631_152_000_000_000_000  # 1990: before it a clock was not set
 _MOST_SHARED = 0.5  # a reference speed must lie inside the range of at least this many runs
-_NOMINAL_TEMPERATURE_C = 15.0
-_TEMPERATURE_SCALE = 0.02  # friction per 10 K, about: the unit in which its covariate counts
-
 CoastdownRow = Mapping[str, Any]
 
 
@@ -142,14 +139,12 @@ def _reference_speed(
     rows: Sequence[CoastdownRow], service: float | None
 ) -> tuple[float, tuple[str, ...]]:
     """Return the speed at which runs are compared, and what is to be said of it."""
-    ranges = [found for row in rows if (found := _range(row)) is not None]
+    ranges = [found for row in rows if (found := _range(row))]
     if not ranges:
         return np.nan, ('no run has an estimate',)
     low, high = np.array(ranges).T
-    if service is not None:
-        share = float(np.mean((low <= service) & (service <= high)))
-        if share >= _MOST_SHARED:
-            return service, ()
+    if service is not None and np.mean((low <= service) & (service <= high)) >= _MOST_SHARED:
+        return service, ()
     stops = [row['speed_at_stop_m_s'] for row in rows if row['speed_at_stop_m_s']]
     wished = USUAL_SHARE * float(np.median(stops)) if stops else float(np.median(high))
     places = np.unique(np.concatenate([low, high, [wished]]))
@@ -195,18 +190,23 @@ def _point(row: CoastdownRow, speed: float, clean: float, baseline: bool) -> Poi
     if found is None:
         return replace(plain, reason='no estimate of r(v)')
     if not np.isfinite(r):
-        return replace(
-            plain,
-            reason=f'r is known from {found[0]:.2f} to {found[1]:.2f} m/s, '
-            f'the reference speed is {speed:.2f} m/s',
-        )
+        ends = f'{found[0]:.2f} to {found[1]:.2f} m/s'
+        why = f'r is known from {ends}, the reference speed is {speed:.2f} m/s'
+        return replace(plain, reason=why)
     if baseline and not np.isfinite(clean):
         return replace(plain, reason='its ship file has no baseline at the reference speed')
-    unit = clean if baseline else 1.0
-    sd = _at('sigma_m_s2', row, speed) / unit
-    repeatable = _at('sigma_repeatable_m_s2', row, speed) / unit
+    sd, repeatable = (_at(name, row, speed) for name in ('sigma_m_s2', 'sigma_repeatable_m_s2'))
+    point = replace(plain, value=r, sd=sd, sd_repeatable=repeatable)
+    return _over(point, clean) if baseline else point
+
+
+def _over(point: Point, clean: float) -> Point:
+    """Put a value over that of the clean hull."""
     return replace(
-        plain, value=r / unit - (1.0 if baseline else 0.0), sd=sd, sd_repeatable=repeatable
+        point,
+        value=point.value / clean - 1.0,
+        sd=point.sd / clean,
+        sd_repeatable=point.sd_repeatable / clean,
     )
 
 
@@ -264,27 +264,19 @@ def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
     values = np.array([point.value for point in first])
     weight = 1.0 / np.array([point.sd_repeatable for point in first]) ** 2
     clean = float(weight @ values / weight.sum()) if first else np.nan
-    scaled = [
-        replace(
-            point,
-            value=point.value / clean - 1.0,
-            sd=point.sd / clean,
-            sd_repeatable=point.sd_repeatable / clean,
-        )
-        for point in points
-    ]
     note = (
         f'the ship file has no baseline: the clean hull is the mean of the first {len(first)} '
         'run(s), in 90 days; give a baseline, or one from clean runs (shipdrag baseline)'
     )
-    return scaled, clean, note if first else 'no run can be used'
+    over = [_over(point, clean) for point in points]
+    return over, clean, note if first else 'no run can be used'
 
 
 def _with_covariates(points: Sequence[Point], rows: Sequence[CoastdownRow]) -> list[Point]:
     """Set displacement and water temperature, each against its mean over the used runs."""
     volume = np.array([np.log(row['displaced_volume_m3']) for row in rows])
     temperature = np.array([row['water_temperature_c'] for row in rows], float)
-    warmth = (temperature - _NOMINAL_TEMPERATURE_C) / 10.0 * _TEMPERATURE_SCALE
+    warmth = (temperature - 15.0) / 10.0 * 0.02  # about what friction changes by
     return [
         replace(point, covariates=(each, other))
         for point, each, other in zip(points, _centred(volume), _centred(warmth))

@@ -104,7 +104,6 @@ def cleaning_date(
     return CleaningDate(middle, earliest, latest)
 
 
-_OUTLIER = 0.5
 _SISTER_SD = 0.05  # of growth per year, between ships of one drawing
 _SISTER_TOLERANCE = 0.01
 _CURVE_POINTS = 200
@@ -228,7 +227,7 @@ class ShipTrend:
         found = []
         for point in self.series.points:
             share = next(used, 0.0) if point.used else 0.0
-            if share > _OUTLIER:
+            if share > 0.5:
                 text = f'an outlier by {share:.0%}: given little weight, not removed'
                 point = replace(point, reason=text)
             found.append(point)
@@ -296,11 +295,13 @@ def fleet_trends(
         series = series_of(name, list(own), service_speed_m_s=speed)
         known.append((series, economics, events.get(name, ())))
     alone = [ship_trend(*each) for each in known]
-    found = []
-    for place, each in enumerate(known):
-        growth = _from_sisters(alone, place)
-        found.append(alone[place] if growth is None else ship_trend(*each, growth=growth))
-    return _ranked(found)
+    growths = [_from_sisters(alone, place) for place in range(len(alone))]
+    return _ranked(
+        [
+            ship_trend(*each, growth=growth) if growth else trend
+            for each, growth, trend in zip(known, growths, alone)
+        ]
+    )
 
 
 def ship_trend(
@@ -328,9 +329,18 @@ def ship_trend(
     if len(used) < _LEAST_RUNS:
         why = f'{len(used)} run(s) can be used, a trend needs {_LEAST_RUNS}: give more runs'
         return ShipTrend(series, notes=(*series.notes, why))
+    times = np.array([point.time_ns for point in used])
     first_ns = used[0].time_ns
-    runs = _runs(used)
+    runs = Runs(
+        (times - first_ns) / YEAR_NS,
+        np.array([point.value for point in used]),
+        np.array([point.sd_repeatable for point in used]),
+        np.array([point.covariates for point in used]),
+    )
     inside = [event for event in known if first_ns < event.time_ns <= used[-1].time_ns]
+    notes = series.notes
+    if left := len(known) - len(inside):
+        notes += (f'{left} event(s) of events.csv lie outside the time of the runs: not used',)
     # two notes of one kind at one time are of one step
     once = tuple({(event.time_ns, event.kind): event for event in inside}.values())
     steps = Steps(
@@ -354,20 +364,9 @@ def ship_trend(
         LevelCurve((first_ns + years * YEAR_NS).astype(np.int64), curve.value, curve.sd),
         tuple(state.outlier.tolist()),
         state.scatter,
-        notes=(*series.notes, *_outside(known, inside)),
+        notes=notes,
     )
     return _with_costs(result, state, economics)
-
-
-def _runs(used: Sequence[Point]) -> Runs:
-    """Return the used points as the model takes them."""
-    times = np.array([point.time_ns for point in used])
-    return Runs(
-        (times - times[0]) / YEAR_NS,
-        np.array([point.value for point in used]),
-        np.array([point.sd_repeatable for point in used]),
-        np.array([point.covariates for point in used]),
-    )
 
 
 def _shared_sd(used: Sequence[Point]) -> float:
@@ -394,14 +393,6 @@ def _events(
             [probability] = [each.probability for each in found if each.year == year]
             events.append(TrendEvent(time_ns, UNKNOWN_KIND, False, probability, change))
     return tuple(events)
-
-
-def _outside(known: Sequence[HullEvent], inside: Sequence[HullEvent]) -> tuple[str, ...]:
-    """Say which events of the log book no run can show."""
-    left = [event for event in known if event not in inside]
-    if not left:
-        return ()
-    return (f'{len(left)} event(s) of events.csv lie outside the time of the runs: not used',)
 
 
 def _with_costs(result: ShipTrend, state: HullState, economics: Economics | None) -> ShipTrend:

@@ -31,7 +31,10 @@ def ranking(trends: Sequence[ShipTrend]) -> Table:
     """
     rows = []
     for trend in trends:
-        costs = trend.costs
+        costs, pays = trend.costs, 'cannot be said'
+        if trend.cleaning is not None:
+            years = trend.cleaning.years
+            pays = day(trend.after_last_run(years)) if years else 'now'
         money = {'costs [USD a year]': '-' if costs is None else amount(costs.usd_per_year)}
         power = {'effective power [kW]': _plus_minus(trend.power_kw, 1.0)}
         rows.append(
@@ -43,7 +46,7 @@ def ranking(trends: Sequence[ShipTrend]) -> Table:
                 'speed lost [%]': speed_lost_percent(_added(trend)),
                 'fuel [t/day]': '-' if costs is None else amount(costs.fuel_t_per_day),
                 'growth [% a year]': percent(trend.growth_per_year),
-                'cleaning pays from': _cleaning(trend),
+                'cleaning pays from': pays,
                 'runs used': f'{len(trend.series.used)} of {len(trend.series.points)}',
             }
         )
@@ -110,26 +113,14 @@ def lines(trend: ShipTrend) -> list[str]:
 def speed_loss(trend: ShipTrend) -> str:
     """
     Return the speed loss at equal effective power, as a clause; '' where not known.
-
-    Power goes about as the cube of the speed; it is not the measure of ISO 19030, which needs
-    shaft power.
     """
-    loss = speed_lost(_added(trend))
+    loss = _speed_lost(_added(trend))
     return '' if loss is None else f', about {loss:.1%} of speed lost at equal effective power'
 
 
-def speed_lost(added: float) -> float | None:
-    """
-    Return the share of speed lost at equal effective power; None where it cannot be said.
-
-    Power goes as the cube of the speed. It is not the measure of ISO 19030, which
-    needs shaft power.
-
-    Parameters
-    ----------
-    added
-        Resistance over that of the clean hull, a share of it.
-    """
+def _speed_lost(added: float) -> float | None:
+    """Return the share of speed lost at equal effective power; None where it cannot be said."""
+    # power goes as the cube of the speed; the measure of ISO 19030 would need shaft power
     return 1.0 - (1.0 + added) ** (-1.0 / 3.0) if added > -0.9 else None
 
 
@@ -137,18 +128,16 @@ def event_table(trend: ShipTrend) -> Table:
     """
     Return the steps of one ship, in the order of time.
     """
-    return Table(
-        ('date', 'event', 'probability', 'change [%]'),
-        tuple(
-            (
-                day(event.time_ns),
-                event.kind if event.known else 'step that no log book notes',
-                '-' if event.known else f'{event.probability:.0%}',
-                percent(event.change),
-            )
-            for event in trend.events
-        ),
+    rows = (
+        (
+            day(event.time_ns),
+            event.kind if event.known else 'step that no log book notes',
+            '-' if event.known else f'{event.probability:.0%}',
+            percent(event.change),
+        )
+        for event in trend.events
     )
+    return Table(('date', 'event', 'probability', 'change [%]'), tuple(rows))
 
 
 def _added(trend: ShipTrend) -> float:
@@ -159,7 +148,7 @@ def speed_lost_percent(added: float) -> str:
     """
     Return the speed lost at equal effective power in percent; '-' where it cannot be said.
     """
-    loss = speed_lost(added)
+    loss = _speed_lost(added)
     return '-' if loss is None else f'{100.0 * loss:.1f}'
 
 
@@ -174,13 +163,6 @@ def _plus_minus(found: Parameter | None, unit: float) -> str:
     if found is None:
         return '-'
     return f'{found.value * unit:.1f} ± {2.0 * found.sd * unit:.1f}'
-
-
-def _cleaning(trend: ShipTrend) -> str:
-    if trend.cleaning is None:
-        return 'cannot be said'
-    years = trend.cleaning.years
-    return day(trend.after_last_run(years)) if years else 'now'
 
 
 COLUMNS = (
@@ -228,7 +210,7 @@ def rows(trends: Sequence[ShipTrend]) -> list[dict[str, Any]]:
                 *(each * clean_n / 1000.0 for each in (1.0 + point.value, point.sd)),
                 *(each * clean_n * speed / 1000.0 for each in (1.0 + point.value, point.sd)),
                 *(each * per_unit for each in (point.value, point.sd)),
-                speed_lost(point.value),
+                _speed_lost(point.value),
                 *hull,
             )
             found.append({name: _known(value) for name, value in zip(COLUMNS, values)})
@@ -254,10 +236,10 @@ def write_rows(path: Path, trends: Sequence[ShipTrend]) -> None:
         with path.open('w', newline='', encoding='utf-8') as file:
             writer = csv.DictWriter(file, COLUMNS)
             writer.writeheader()
-            for row in rows(trends):
-                writer.writerow(
-                    {k: spreadsheet_text(v) if isinstance(v, str) else v for k, v in row.items()}
-                )
+            writer.writerows(
+                {k: spreadsheet_text(v) if isinstance(v, str) else v for k, v in row.items()}
+                for row in rows(trends)
+            )
     except OSError as error:
         raise FleetError(f'{str(path)!r} cannot be written: {error.strerror}') from error
 
@@ -272,14 +254,12 @@ def run_table(trends: Sequence[ShipTrend]) -> Any:
         `date` [timestamp in UTC], `added_percent`, `added_percent_sd`, and `COLUMNS`.
     """
     import pyarrow as pa
+    import pyarrow.compute as pc
 
     times = [point.time_ns // 1000 for trend in trends for point in trend.points]
     plain = pa.Table.from_pylist(rows(trends), _schema(pa))
     percent = {
-        f'added_percent{end}': pa.array(
-            [value and 100.0 * value for value in plain[f'added_resistance{end}'].to_pylist()],
-            pa.float64(),
-        )
+        f'added_percent{end}': pc.multiply(plain[f'added_resistance{end}'], 100.0)
         for end in ('', '_sd')
     }
     found = {'ship': plain['ship'], 'date': pa.array(times, pa.timestamp('us')), **percent}

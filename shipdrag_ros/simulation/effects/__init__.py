@@ -54,8 +54,6 @@ class _Library(Mapping[str, Effect]):
 LIBRARY: Mapping[str, Effect] = _Library()
 
 _TERMS: dict[str, LearntTerm] = {}  # that this process has seen, by name
-
-
 _effect_of = lru_cache(256)(effect_of)
 
 
@@ -104,9 +102,8 @@ def effects_of(ship: Ship) -> Mapping[str, Effect]:
     """
     Return the effects that a ship may have: the library, and the terms of her file.
     """
-    if not ship.learnt:
-        return LIBRARY
-    return {**LIBRARY, **{term.name: declared(term) for term in ship.learnt}}
+    learnt = {term.name: declared(term) for term in ship.learnt}
+    return {**LIBRARY, **learnt} if learnt else LIBRARY
 
 
 def terms(names: Collection[str] | None = None) -> tuple[LearntTerm, ...]:
@@ -214,9 +211,9 @@ def parse(text: str) -> StatedEffect:
         try:
             value = known[key].words[word] if word in known[key].words else float(word)
         except ValueError as error:
+            expected = f'{" or ".join(known[key].words) or "a number"} ({known[key].meaning})'
             raise SimulationError(
-                f'effect {text!r}: {key} is {word!r}, expected '
-                f'{" or ".join(known[key].words) or "a number"} ({known[key].meaning})'
+                f'effect {text!r}: {key} is {word!r}, expected {expected}'
             ) from error
         values[key] = Parameter(value, 0.0)
     return StatedEffect(effect.name, values)
@@ -264,15 +261,13 @@ def checked(ship: Ship) -> Ship:
     SimulationError
         Naming an effect or a parameter that is not.
     """
-    if wrong := [text for stated in ship.effects for text in not_known(stated, ship)]:
+    if wrong := [text for stated in ship.effects for text in _not_known(stated, ship)]:
         raise SimulationError(f'effects: {"; ".join(wrong)}')
     return ship
 
 
-def not_known(stated: StatedEffect, ship: Ship) -> Iterator[str]:
-    """
-    Say which effect, or which of its parameters, no effect of a ship has.
-    """
+def _not_known(stated: StatedEffect, ship: Ship) -> Iterator[str]:
+    """Say which effect, or which of its parameters, no effect of a ship has."""
     effects = effects_of(ship)
     if stated.name not in effects:
         yield f'{stated.name!r} is not known; known are {", ".join(effects)}'
@@ -288,28 +283,20 @@ def _problems(stated: StatedEffect, frame: Frame) -> Iterator[str]:
     if effect is not None and (missing := effect.missing(frame.ship)):
         yield f'{effect.name} needs {", ".join(missing)} in the ship file'
         return
-    yield from not_known(stated, frame.ship)
+    yield from _not_known(stated, frame.ship)
     if effect is None:
         return
     for parameter in effect.parameters_of(frame.ship):
-        given = stated.parameters.get(parameter.name)
-        if given is None:
-            if not parameter.is_given:
-                expected = parameter.expectation
-                yield f'{effect.name}: {parameter.name} is missing, expected {expected}'
-        elif not parameter.accepts(given.value):
-            yield (
-                f'{effect.name}: {parameter.name} is {given.value!r}, '
-                f'expected {parameter.expectation}'
-            )
+        given, place = stated.parameters.get(parameter.name), f'{effect.name}: {parameter.name}'
+        if given is None and not parameter.is_given:
+            yield f'{place} is missing, expected {parameter.expectation}'
+        elif given is not None and not parameter.accepts(given.value):
+            yield f'{place} is {given.value!r}, expected {parameter.expectation}'
 
 
 def values_of(stated: StatedEffect, ship: Ship) -> dict[str, float]:
     """
     Return all parameters of an effect that was checked, defaults included.
     """
-    values = {}
-    for parameter in effects_of(ship)[stated.name].parameters_of(ship):
-        given = stated.parameters.get(parameter.name)
-        values[parameter.name] = parameter.value if given is None else given.value
-    return values
+    parameters = effects_of(ship)[stated.name].parameters_of(ship)
+    return {each.name: stated.parameters.get(each.name, each).value for each in parameters}

@@ -108,13 +108,10 @@ class Cable:
     drag: CableSurface | float
 
     def __post_init__(self) -> None:
+        given = ('length_m', self.length_m), ('diameter_m', self.diameter_m), ('C0', self.drag)
         problems = [
             f'{name} is {value!r}, expected above 0 and finite'
-            for name, value in (
-                ('length_m', self.length_m),
-                ('diameter_m', self.diameter_m),
-                ('C0', self.drag),
-            )
+            for name, value in given
             if not (isinstance(value, CableSurface) or 0.0 < value < math.inf)
         ]
         known = problems or SHORTEST < self.slenderness < math.inf
@@ -272,8 +269,8 @@ def naive_range_m_s(tolerance: float) -> tuple[float, float]:
     low, high
         1/(1 + tolerance) and 1/(1 - tolerance) in m/s; inf from 1 on.
     """
-    most = 1.0 / (1.0 - tolerance) if _possible(tolerance) < 1.0 else math.inf
-    return 1.0 / (1.0 + tolerance), most
+    _possible(tolerance)
+    return 1.0 / (1.0 + tolerance), 1.0 / (1.0 - tolerance) if tolerance < 1.0 else math.inf
 
 
 def compare_errors(speed_m_s: float, tolerance: float) -> Float64:

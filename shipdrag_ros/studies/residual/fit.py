@@ -26,8 +26,7 @@ from shipdrag_ros.studies.surface.fit import Domain, Prediction
 
 REQUIRED = ('L_B', 'B_T', 'Fr')
 OPTIONAL = ('C_B', 'slenderness', 'lcb')
-# beyond what the digits of ratios in print explain
-_CONTRADICTION = 0.02
+_CONTRADICTION = 0.02  # beyond what the digits of ratios in print explain
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ class Hulls:
         """
         Return the number of the hull that each row belongs to, from 0.
         """
-        shapes = [self.L_B, self.B_T, self.C_B, *(() if self.lcb is None else (self.lcb,))]
+        shapes = [each for each in (self.L_B, self.B_T, self.C_B, self.lcb) if each is not None]
         _, number = np.unique(np.column_stack(shapes), axis=0, return_inverse=True)
         return number.reshape(-1)
 
@@ -433,7 +432,7 @@ def leave_hulls_out(
         Over the largest of the others.
     """
     groups = hulls.groups()
-    error, sd, leverage = (np.full(len(values), np.nan) for _ in range(3))
+    error, sd, leverage = np.full((3, len(values)), np.nan)
     columns = form.columns(hulls)
     for number in range(groups.max() + 1):
         out = groups == number
@@ -455,17 +454,12 @@ def fit_form(form: RegressionForm, hulls: Hulls, values: Float64) -> ResidualFit
     """
     fit = least_squares(form.columns(hulls), values)
     if fit.freedom < 1:
-        raise DataError(
-            form.name,
-            [
-                f'{len(hulls)} row(s) determine {fit.rank} coefficients and leave no scatter; '
-                'give more hulls or Froude numbers'
-            ],
-        )
-    count = int(hulls.groups().max()) + 1
+        why = f'{len(hulls)} row(s) determine {fit.rank} coefficients and leave no scatter'
+        raise DataError(form.name, [f'{why}; give more hulls or Froude numbers'])
+    groups = hulls.groups()
+    count = int(groups.max()) + 1
     error, sd, _ = leave_hulls_out(form, hulls, values)
     known = np.isfinite(error) & (sd > 0.0)
-    hulls_known = len(np.unique(hulls.groups()[known]))
     spread, left_out = 1.0, float('inf')
     notes = []
     if fit.rank < len(fit.coefficients):
@@ -473,7 +467,7 @@ def fit_form(form: RegressionForm, hulls: Hulls, values: Float64) -> ResidualFit
             f'{count} hulls determine {fit.rank} of {len(fit.coefficients)} coefficients: '
             'single ones mean nothing, and hulls that need the others are refused.'
         )
-    if hulls_known >= _ENOUGH:
+    if len(np.unique(groups[known])) >= _ENOUGH:
         spread = max(1.0, float(np.sqrt(np.mean((error[known] / sd[known]) ** 2))))
         left_out = float(np.mean(error[known] ** 2))
     else:
@@ -490,16 +484,8 @@ def fit_form(form: RegressionForm, hulls: Hulls, values: Float64) -> ResidualFit
             f'{hulls.contradictions} row(s) state C_B and slenderness that contradict each '
             'other; both are used as they are.'
         )
-    return ResidualFit(
-        form=form,
-        hulls=hulls,
-        count=count,
-        fit=fit,
-        domain=Domain.of(form.variables, form.place(hulls)),
-        spread=spread,
-        left_out=left_out,
-        notes=tuple(notes),
-    )
+    domain = Domain.of(form.variables, form.place(hulls))
+    return ResidualFit(form, hulls, count, fit, domain, spread, left_out, tuple(notes))
 
 
 _POINTS = 15  # Froude numbers tried
@@ -534,8 +520,12 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
     largest relative standard deviation among them is stated for all.
     """
     base = ship.baseline
-    missing = [name for name in ('breadth_m', 'draught_m') if getattr(ship, name) is None]
-    problems = [f'{name}: missing, the hull is described by its ratios' for name in missing]
+    breadth, draught = ship.breadth_m or 0.0, ship.draught_m or 0.0
+    problems = [
+        f'{name}: missing, the hull is described by its ratios'
+        for name, size in (('breadth_m', breadth), ('draught_m', draught))
+        if not size
+    ]
     if not isinstance(base, CoefficientBaseline):
         problems.append('baseline: expected one of coefficients, its friction is kept')
     if fitted.form.needs_lcb and lcb is None:
@@ -543,14 +533,13 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
     if problems:
         raise DataError(ship.name or 'ship file', problems)
     assert isinstance(base, CoefficientBaseline)
-    assert ship.breadth_m is not None
-    assert ship.draught_m is not None
     ratios = {
-        'L_B': ship.length_m / ship.breadth_m,
-        'B_T': ship.breadth_m / ship.draught_m,
+        'L_B': ship.length_m / breadth,
+        'B_T': breadth / draught,
         'slenderness': ship.slenderness,
-        **({} if lcb is None else {'lcb': lcb}),
     }
+    if lcb is not None:
+        ratios['lcb'] = lcb
     froude = np.linspace(fitted.hulls.Fr.min(), fitted.hulls.Fr.max(), _POINTS)
     rows = np.array([[*ratios.values(), each] for each in froude])
     found = fitted.predict(Hulls.of(ship.name, (*ratios, 'Fr'), rows))
@@ -578,15 +567,13 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
     if problems:
         raise DataError(ship.name or 'ship file', problems)
     low, high = froude[used[0]], froude[used[-1]]
-    return replace(
-        ship,
-        baseline=replace(
-            base,
-            form_factor=0.0,
-            wave_froude=tuple(froude[used].tolist()),
-            wave_coefficient=tuple(value.tolist()),
-            relative_sd=CoefficientSd(friction=base.relative_sd.friction, wave=relative),
-            source=f'wave: form {fitted.form.name} fitted to {fitted.count} hulls, accepted for '
-            f'Fr {low:.3g} to {high:.3g}; friction: {base.source}',
-        ),
+    baseline = replace(
+        base,
+        form_factor=0.0,
+        wave_froude=tuple(froude[used].tolist()),
+        wave_coefficient=tuple(value.tolist()),
+        relative_sd=CoefficientSd(friction=base.relative_sd.friction, wave=relative),
+        source=f'wave: form {fitted.form.name} fitted to {fitted.count} hulls, accepted for '
+        f'Fr {low:.3g} to {high:.3g}; friction: {base.source}',
     )
+    return replace(ship, baseline=baseline)

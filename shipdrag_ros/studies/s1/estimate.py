@@ -144,12 +144,11 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     inputs = (position, speed)
     # above 0 for data that a fit follows exactly, too
     least = [float(np.finfo(np.float64).eps * np.abs(data.value).max()) for data in inputs]
-    sigmas = np.array(
-        [
-            data.known_sigma or max(solution.noise_sd[data.name], rounded) or 1.0
-            for data, solution, rounded in zip(inputs, alone, least)
-        ]
-    )
+    found = [
+        data.known_sigma or max(solution.noise_sd[data.name], rounded) or 1.0
+        for data, solution, rounded in zip(inputs, alone, least)
+    ]
+    sigmas = np.array(found)
     scale = TimeScale.of(position.time_ns, speed.time_ns)
     counts = np.array([len(position.value), len(speed.value)])
     times = scale.normalise(np.concatenate([position.time_ns, speed.time_ns]))
@@ -157,13 +156,11 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     basis = OrthogonalBasis.on(times, max(position.basis.order, speed.basis.order))
     rates = basis.evaluate(times[counts[0] :], derivatives=1)[1] / scale.half_s
     # each input condensed once; weights and orders are then a matter of small matrices
-    factors = np.concatenate(
-        [
-            triangle(np.vstack([rows, data.value]).T) / sigma
-            for rows, data, sigma in zip((basis.columns[:, : counts[0]], rates), inputs, sigmas)
-        ]
-    )
-    q, r = np.linalg.qr(factors)
+    condensed = [
+        triangle(np.vstack([rows, data.value]).T) / sigma
+        for rows, data, sigma in zip((basis.columns[:, : counts[0]], rates), inputs, sigmas)
+    ]
+    q, r = np.linalg.qr(np.concatenate(condensed))
     projected = r[:, -1]
     parts = np.stack([q[: len(r)], q[len(r) :]])
     # residual of each order: what the columns from that order on take of the data
@@ -221,9 +218,6 @@ def _trials(table: OrderTable, speed: Float64, position: Float64) -> tuple[Order
     )
 
 
-_GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is evaluated
-
-
 @dataclass(frozen=True)
 class _Requirement:
     """What a problem needs."""
@@ -271,7 +265,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     solution = solve_joint(*inputs) if len(inputs) > 1 else solve_one(*inputs)
     fit = solution.fit
     _check_deceleration(parameters.estimator, solution)
-    motion = fit.motion(_GRID)
+    motion = fit.motion(np.linspace(-1.0, 1.0, 257))
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
     return Estimate(
         parameters.estimator,
@@ -335,11 +329,10 @@ def _scalar(name: str, series: Series, parameters: Parameters) -> ScalarInput:
     scale = TimeScale.of(series.time_ns)
     time = scale.normalise(series.time_ns)
     basis = OrthogonalBasis.on(time, parameters.order_max)
-    if name != 'position':
-        sigma_m_s = parameters.speed_sigma_m_s
-        return ScalarInput(name, series.time_ns, series.value, sigma_m_s, scale, basis)
-    distance = along_track(time, series.value)
-    return ScalarInput(name, series.time_ns, distance, parameters.position_sigma_m, scale, basis)
+    value, sigma = series.value, parameters.speed_sigma_m_s
+    if name == 'position':
+        value, sigma = along_track(time, value), parameters.position_sigma_m
+    return ScalarInput(name, series.time_ns, value, sigma, scale, basis)
 
 
 def _check_deceleration(estimator: str, solution: Solution) -> None:
@@ -376,10 +369,5 @@ def published(name: str, meaning: str) -> Estimator:
     def of_problem(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         return estimate(window, ship, replace(parameters, estimator=name))
 
-    return Estimator(
-        name=name,
-        meaning=meaning,
-        estimate=of_problem,
-        constant_order=PROBLEMS[name].order,
-        caveat=_CAVEAT,
-    )
+    order = PROBLEMS[name].order
+    return Estimator(name, meaning, of_problem, constant_order=order, caveat=_CAVEAT)

@@ -23,10 +23,8 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.least_squares import OrderTable, rounding
 
-# |cos| between two columns above which a column is orthogonalised a second time
-ORTHOGONALITY_LOST = 1e-13
-# a column this small beside the terms it is the difference of is rounding, not a polynomial
-_VANISHED = 1e-12
+ORTHOGONALITY_LOST = 1e-13  # |cos| of two columns above which one is orthogonalised again
+_VANISHED = 1e-12  # beside the terms that a column is the difference of: rounding
 
 
 @dataclass(frozen=True)
@@ -290,9 +288,6 @@ def fit_orders(basis: OrthogonalBasis, values: Float64) -> tuple[Float64, OrderT
     return coefficients, table
 
 
-_MIN_POINTS = 3  # fewer are no curve
-
-
 @dataclass(frozen=True)
 class Motion:
     """
@@ -350,7 +345,8 @@ class PolynomialMotion:
         time = self.scale.normalise(time_ns)
         order = len(self.coefficients)
         rows = self.basis.evaluate(time, derivatives=derivative, order=order)[derivative]
-        return _combine(self.coefficients, rows) / self.scale.half_s**derivative
+        fitted: Float64 = np.einsum('k,km->m', self.coefficients, rows)
+        return fitted / self.scale.half_s**derivative
 
     def motion(self, time: Float64) -> Motion:
         """
@@ -362,15 +358,9 @@ class PolynomialMotion:
         values, errors = [], []
         for derivative in range(first, first + 3):
             unit = self.scale.half_s**derivative
-            values.append(_combine(self.coefficients, rows[derivative]) / unit)
+            values.append(np.einsum('k,km->m', self.coefficients, rows[derivative]) / unit)
             errors.append(np.einsum('jm,jk->mk', rows[derivative], self.root) / unit)
         return Motion(*values, *errors)
-
-
-def _combine(coefficients: Float64, rows: Float64) -> Float64:
-    """Sum polynomials, (k,) times (k, m)."""
-    result: Float64 = np.einsum('k,km->m', coefficients, rows)
-    return result
 
 
 def sigma(error: Float64) -> Float64:
@@ -382,14 +372,9 @@ def sigma(error: Float64) -> Float64:
 
 
 def _resistance(motion: Motion, ship: Ship) -> ResistanceCurve:
-    """
-    Return r and its slope at the times of a motion.
-
-    Notes
-    -----
-    S1 (12, 13); the error of n_r is independent of that of the motion. With a = dv/dt:
-    dr/dv = -((1 + n_r) da/dt / a + dn_r/dv a); its error is of the motion alone.
-    """
+    """Return r and its slope at the times of a motion: S1 (12, 13)."""
+    # the error of n_r is independent of that of the motion; with a = dv/dt the slope is
+    # dr/dv = -((1 + n_r) da/dt / a + dn_r/dv a), its error of the motion alone
     speed, a, jerk = motion.speed, motion.acceleration, motion.jerk
     n_r = np.polynomial.Polynomial(ship.n_r_polynomial())
     inertia, by_v = 1.0 + n_r(np.abs(speed)), n_r.deriv()(np.abs(speed))
@@ -433,7 +418,7 @@ def resistance_curve(motion: Motion, ship: Ship, *, froude_min: float) -> Resist
     goes_on = usable[1:] & usable[:-1] & (np.diff(speed) < 0.0)
     falls = np.split(np.arange(len(speed)), np.flatnonzero(~goes_on) + 1)
     longest = max(falls, key=lambda times: speed[times[0]] - speed[times[-1]])
-    if len(longest) < _MIN_POINTS:
+    if len(longest) < 3:  # no curve
         low, high = float(speed.min()), float(speed.max())
         raise EstimationError(
             f'the fitted speed, {low:.4g}..{high:.4g} m/s (Fr {ship.froude(low):.3g}..'

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,6 @@ from shipdrag_ros.ship import CoefficientBaseline, Ship, TableAddedMass, TableBa
 from shipdrag_ros.simulation import STANDARD_SD, Action, Effect, Frame, Scenario, simulate_columns
 from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Responses, Selection, vary
-
-_Change = Callable[[Ship, float], Ship]
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Particular:
     key: str
     value: float
     sd: float
-    scaled: _Change
+    scaled: Callable[[Ship, float], Ship]
 
 
 def particulars(ship: Ship, *, speed_m_s: float) -> tuple[Particular, ...]:
@@ -90,15 +89,14 @@ def _listed(ship: Ship, speed_m_s: float) -> Iterator[Particular]:
         yield _field('baseline.correlation_allowance', ship)
         yield Particular('baseline.C_V', np.nan, base.relative_sd.friction, _viscous)
         if any(base.wave_coefficient):
-            wave = base.relative_sd.wave
-            yield _field('baseline.wave_coefficient', ship, sd=wave)
+            yield _field('baseline.wave_coefficient', ship, sd=base.relative_sd.wave)
     elif isinstance(base, TableBaseline):
         yield _field('baseline.resistance_n', ship, sd=base.relative_sd)
     for effect in ship.effects:
         for name, stated in effect.parameters.items():
             sd = stated.sd / abs(stated.value) if stated.sd and stated.value else np.nan
-            key = f'effects.{effect.name}.{name}'
-            yield Particular(key, stated.value, sd, _effect(effect.name, name))
+            scaled = partial(_effect, name=effect.name, parameter=name)
+            yield Particular(f'effects.{effect.name}.{name}', stated.value, sd, scaled)
 
 
 def _field(key: str, ship: Ship, *, sd: float = np.nan) -> Particular:
@@ -134,16 +132,13 @@ def _viscous(ship: Ship, factor: float) -> Ship:
     return replace(ship, baseline=changed)
 
 
-def _effect(name: str, parameter: str) -> _Change:
-    def scaled(ship: Ship, factor: float) -> Ship:
-        effect = next(one for one in ship.effects if one.name == name)
-        stated = effect.parameters[parameter]
-        values = {**effect.parameters, parameter: Parameter(factor * stated.value, stated.sd)}
-        changed = replace(effect, parameters=values)
-        others = (changed if one is effect else one for one in ship.effects)
-        return replace(ship, effects=tuple(others))
-
-    return scaled
+def _effect(ship: Ship, factor: float, *, name: str, parameter: str) -> Ship:
+    effect = next(one for one in ship.effects if one.name == name)
+    stated = effect.parameters[parameter]
+    values = {**effect.parameters, parameter: Parameter(factor * stated.value, stated.sd)}
+    changed = replace(effect, parameters=values)
+    others = (changed if one is effect else one for one in ship.effects)
+    return replace(ship, effects=tuple(others))
 
 
 KIND = 'coastdown'
@@ -220,7 +215,7 @@ def coast_from(ship: Ship, speed_m_s: float | None = None) -> Coast:
     SensitivityError
         If it is not within the baseline, or too low to slow down from.
     """
-    low, high = slowest_m_s(ship), ship.baseline_range_m_s[1]
+    low, high = _slowest_m_s(ship), ship.baseline_range_m_s[1]
     speed = SPEED_FRACTION * high if speed_m_s is None else speed_m_s
     # written so that NaN fails
     if not low <= speed <= high:
@@ -235,17 +230,13 @@ def coast_from(ship: Ship, speed_m_s: float | None = None) -> Coast:
         duration += ship.propulsion.run_down_s
     duration = min(duration, _LONGEST_S)
     scenario = Scenario(speed_m_s=speed, lead_in_s=_LEAD_IN_S, duration_s=duration)
-    step = duration / (_SAMPLES - 1)
-    steady = np.arange(0.0, _LEAD_IN_S, step)
-    return Coast(
-        scenario, np.concatenate([steady, np.linspace(_LEAD_IN_S, scenario.length_s, _SAMPLES)])
-    )
+    steady = np.arange(0.0, _LEAD_IN_S, duration / (_SAMPLES - 1))
+    coasting = np.linspace(_LEAD_IN_S, scenario.length_s, _SAMPLES)
+    return Coast(scenario, np.concatenate([steady, coasting]))
 
 
-def slowest_m_s(ship: Ship) -> float:
-    """
-    Return the lowest speed that a coastdown may begin at.
-    """
+def _slowest_m_s(ship: Ship) -> float:
+    """Return the lowest speed that a coastdown may begin at."""
     low = ship.baseline_range_m_s[0]
     return max(_ABOVE * low, float(ship.speed(FROUDE_MIN))) / _LEAST
 
@@ -373,10 +364,8 @@ def _flat(readings: Float64) -> Float64:
 def _usual_values(effect: Effect, ship: Ship) -> tuple[float, ...]:
     """Return a usual size of an effect."""
     size, *others = effect.parameters_of(ship)
-    return (
-        size.prior.typical,
-        *(other.value if other.is_given else other.prior.typical for other in others),
-    )
+    usual = (other.value if other.is_given else other.prior.typical for other in others)
+    return size.prior.typical, *usual
 
 
 _CHECK_FRACTION = 0.85  # of the speed, in the check
@@ -390,7 +379,6 @@ class Importance:
 
     Attributes
     ----------
-    particular
     estimated, stated
         Relative change of r(v), root mean square over the speeds of the coast,
         by 10 per cent of the value: of the r that is estimated from a record,
@@ -431,8 +419,6 @@ class CoastStudy:
 
     Attributes
     ----------
-    ship
-    coast
     losses
         Of `CHANGES`, and of plus and minus one stated standard deviation; root
         mean square, in standard deviations of the instruments.
@@ -442,7 +428,6 @@ class CoastStudy:
         One a value.
     mimics
         One an effect that the ship file lets act.
-    check
     """
 
     ship: Ship
@@ -486,8 +471,6 @@ def study_coast(ship: Ship, coast: Coast, *, keep: int | None = None) -> CoastSt
 
     Parameters
     ----------
-    ship
-    coast
     keep
         How many values; those of which an error of 10 per cent moves the
         record beyond the noise of its instruments by default.
@@ -498,30 +481,21 @@ def study_coast(ship: Ship, coast: Coast, *, keep: int | None = None) -> CoastSt
         If there are not so many.
     """
     listed = particulars(ship, speed_m_s=coast.scenario.speed_m_s)
-    whole = _respond(ship, coast, listed)
+
+    def simulate(factors: Float64) -> Float64:
+        return np.stack([_reading(_changed(ship, listed, row), coast) for row in factors])
+
+    steps = np.array([[*CHANGES, one.sd, -one.sd] for one in listed])
+    whole = vary(simulate, [one.key for one in listed], np.ones(len(listed)), steps)
     coasting = replace(whole, differences=whole.differences[:, :, coast.after_stop])
     losses = coasting.losses()
     if keep is None:
         keep = max(1, int(np.sum(_mean(losses.table[:, _SMALL]) >= 1.0)))
     selection = losses.select(keep)
-    return CoastStudy(
-        ship,
-        coast,
-        losses,
-        selection,
-        _importance(ship, coast, listed, losses),
-        mimics(ship, coast, listed, whole.slopes() / CHANGES[0]),
-        _check(ship, coast, listed, coasting, selection),
-    )
-
-
-def _respond(ship: Ship, coast: Coast, listed: Sequence[Particular]) -> Responses:
-    def simulate(factors: Float64) -> Float64:
-        return np.stack([_reading(_changed(ship, listed, row), coast) for row in factors])
-
-    names = [one.key for one in listed]
-    steps = np.array([[*CHANGES, one.sd, -one.sd] for one in listed])
-    return vary(simulate, names, np.ones(len(names)), steps)
+    importance = _importance(ship, coast, listed, losses)
+    alike = mimics(ship, coast, listed, whole.slopes() / CHANGES[0])
+    check = _check(ship, coast, listed, coasting, selection)
+    return CoastStudy(ship, coast, losses, selection, importance, alike, check)
 
 
 def _changed(ship: Ship, listed: Sequence[Particular], factors: Float64) -> Ship:
@@ -559,11 +533,12 @@ def _importance(
     known = float(np.linalg.norm(_mean(losses.table[:, _SD]))) or np.nan
     found = []
     for one, loss in zip(listed, small):
-        shifts = []
-        for before, after in zip(both(ship), both(one.scaled(ship, 1.0 - CHANGES[0]))):
-            shifts.append(float(np.sqrt(np.mean((after / before - 1.0) ** 2))))
+        estimated, stated = (
+            float(np.sqrt(np.mean((after / before - 1.0) ** 2)))
+            for before, after in zip(both(ship), both(one.scaled(ship, 1.0 - CHANGES[0])))
+        )
         tolerable = CHANGES[0] * known / loss if loss > 0.0 else math.inf
-        found.append(Importance(one, shifts[0], shifts[1], tolerable))
+        found.append(Importance(one, estimated, stated, tolerable))
     return tuple(found)
 
 
@@ -578,9 +553,7 @@ def _check(
     signs = np.where(shift < 0.0, -1.0, 1.0)
     dropped = [one.key in selection.dropped for one in listed]
     factors = np.where(dropped, 1.0 + CHANGES[0] * signs, 1.0)
-    other = coast_from(ship, max(_CHECK_FRACTION * coast.scenario.speed_m_s, slowest_m_s(ship)))
-    true, wrong = (
-        _reading(one, other)[other.after_stop] for one in (ship, _changed(ship, listed, factors))
-    )
-    rms = np.sqrt(np.mean((wrong - true) ** 2, axis=0))
+    other = coast_from(ship, max(_CHECK_FRACTION * coast.scenario.speed_m_s, _slowest_m_s(ship)))
+    wrong = _reading(_changed(ship, listed, factors), other) - _reading(ship, other)
+    rms = np.sqrt(np.mean(wrong[other.after_stop] ** 2, axis=0))
     return CoastCheck(other, float(rms[0]) * LOG_SD_M_S, float(rms[1]) * POSITION_SD_M)

@@ -17,9 +17,6 @@ import numpy as np
 from shipdrag_ros.errors import SensitivityError
 from shipdrag_ros.samples import Float64
 
-# from parameter sets (k, p) to motions (k, n, q): n times, q quantities without unit
-Simulator = Callable[[Float64], Float64]
-
 CHANGES = (0.1, -0.1, 0.5, -0.5)  # of a parameter, relative
 _COLUMNS = ('+10', '-10', '+50', '-50', '+sd', '-sd')  # of a table of losses
 _ROUNDING = 1e-12
@@ -123,11 +120,9 @@ class Losses:
             raise SensitivityError(
                 f'keep is {count!r}, expected 1..{len(self.names)}, the number of parameters'
             )
-        ranking = self.ranking
-        mean = dict(zip(self.names, self.mean.tolist()))
+        ranking, mean = self.ranking, np.append(self.mean[self.order], 0.0)
         # halfway in the logarithm between the last one kept and the first one dropped
-        after = mean[ranking[count]] if count < len(ranking) else 0.0
-        threshold = float(np.sqrt(mean[ranking[count - 1]]) * np.sqrt(after))
+        threshold = float(np.sqrt(mean[count - 1]) * np.sqrt(mean[count]))
         return Selection(ranking[:count], ranking[count:], threshold)
 
 
@@ -171,14 +166,17 @@ class Responses:
         return half.reshape(len(self.names), -1)
 
 
-def vary(simulate: Simulator, names: Sequence[str], values: Float64, steps: Float64) -> Responses:
+def vary(
+    simulate: Callable[[Float64], Float64], names: Sequence[str], values: Float64, steps: Float64
+) -> Responses:
     """
     Change one parameter at a time, all in one call of a simulator.
 
     Parameters
     ----------
     simulate
-        Called once, with 1 + p c sets of parameters; the first is unchanged.
+        From sets of parameters (k, p) to motions (k, n, q): n times, q quantities without
+        unit. Called once, with 1 + p c sets; the first is unchanged.
     names
         Of the p parameters.
     values : (p,)

@@ -42,7 +42,6 @@ DESIGN = (
     *(zigzag(angle) for angle in (5.0, 10.0, 15.0, 20.0, 25.0, 35.0)),
     *(turn(angle) for angle in (10.0, 20.0, 35.0)),
 )
-TINY = (1e-3, -1e-3)  # what is not linear would look like no other
 
 
 @dataclass(frozen=True)
@@ -91,20 +90,16 @@ class ReducedModelCheck:
     @property
     def overshoots_rad(self) -> tuple[Float64, Float64]:
         """First and second, of the full and of the reduced model; fewer where there are fewer."""
-        full, reduced = (
-            overshoots_rad(each, CHECKED_BY)[:2] for each in (self.full, self.reduced)
-        )
+        full, reduced = (overshoots_rad(one, CHECKED_BY)[:2] for one in (self.full, self.reduced))
         return full, reduced
 
     @property
     def rms_difference(self) -> dict[str, float]:
         """Root mean square over the manoeuvre, by quantity; not finite where a model is lost."""
         names = ('surge_m_s', 'sway_m_s', 'yaw_rate_rad_s', 'heading_rad')
-        full, reduced = (
-            np.column_stack([motion.speeds, motion.heading_rad])
-            for motion in (self.full, self.reduced)
-        )
-        return dict(zip(names, np.sqrt(np.mean((full - reduced) ** 2, axis=0)).tolist()))
+        speeds = self.full.speeds - self.reduced.speeds
+        apart = np.column_stack([speeds, self.full.heading_rad - self.reduced.heading_rad])
+        return dict(zip(names, np.sqrt(np.mean(apart**2, axis=0)).tolist()))
 
 
 @dataclass(frozen=True)
@@ -295,7 +290,7 @@ def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> E
     """
     Find which manoeuvre makes which derivative visible.
     """
-    changes = (*CHANGES[:2], *TINY)
+    changes = (*CHANGES[:2], 1e-3, -1e-3)  # tiny: what is not linear would look like no other
     responses = [respond(ship, manoeuvre, changes=changes) for manoeuvre in manoeuvres]
     slopes = [one.slopes(2, 3) for one in responses]
     return Experiment(

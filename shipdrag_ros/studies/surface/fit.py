@@ -103,8 +103,7 @@ class Polynomial:
         """
         Return the derivatives by each variable at (m, d) points; (m, d).
         """
-        slopes = [self.derivative(variable)(points) for variable in range(len(self.centre))]
-        return np.column_stack(slopes)
+        return np.column_stack([self.derivative(i)(points) for i in range(len(self.centre))])
 
     def derivative(self, variable: int) -> Polynomial:
         """
@@ -131,14 +130,10 @@ class Polynomial:
                 steps[number] = place[tuple(before.tolist())], by
         return steps
 
+    @cached_property
     def raw(self) -> Float64:
         """
-        Return the matrix from scaled coefficients to those of raw powers.
-
-        Returns
-        -------
-        (terms, terms)
-            Rows in the order of `powers`, now of the variables themselves.
+        (terms, terms) From scaled coefficients to those of raw powers, in the order of `powers`.
 
         Notes
         -----
@@ -175,15 +170,11 @@ class Polynomial:
                 f'    _z{j}_{power} = _z{j}_{power - 1} * _z{j}_1'
                 for power in range(2, int(self.powers[:, j].max()) + 1)
             ]
-        terms = [
-            ' * '.join(
-                [repr(float(value))]
-                + [f'_z{j}_{power}' for j, power in enumerate(powers) if power > 0]
-            )
-            for powers, value in zip(self.powers, self.coefficients)
-        ]
-        lines += ['    return (', *(f'        + {term}' for term in terms), '    )']
-        return '\n'.join(lines) + '\n'
+        lines.append('    return (')
+        for powers, value in zip(self.powers, self.coefficients):
+            factors = [f'_z{j}_{power}' for j, power in enumerate(powers) if power > 0]
+            lines.append(f'        + {" * ".join([repr(float(value)), *factors])}')
+        return '\n'.join([*lines, '    )\n'])
 
 
 def monomials(scaled: Float64, powers: Powers) -> Float64:
@@ -390,17 +381,13 @@ class Surface:
     @cached_property
     def coefficients(self) -> Float64:
         """(terms,) Of raw powers of the inputs, in the order of `polynomial.powers`."""
-        return self._raw @ self.fit.coefficients
+        return self.polynomial.raw @ self.fit.coefficients
 
     @cached_property
     def sd(self) -> Float64:
         """(terms,) Standard deviations of `coefficients`."""
-        spread = np.einsum('ij,jk,ik->i', self._raw, self.fit.covariance, self._raw)
-        return np.asarray(np.sqrt(spread))
-
-    @cached_property
-    def _raw(self) -> Float64:
-        return self.polynomial.raw()
+        raw = self.polynomial.raw
+        return np.asarray(np.sqrt(np.einsum('ij,jk,ik->i', raw, self.fit.covariance, raw)))
 
     def predict(self, points: Float64) -> list[Prediction]:
         """
@@ -421,12 +408,13 @@ class Surface:
             f'{key} {low:g}..{high:g}' for key, (low, high) in self.domain.ranges.items()
         )
         note = f'Polynomial of degree {self.degree} fitted to {ranges}.'
-        functions = [self.polynomial.source(name, self.inputs, note)]
-        for number, each in enumerate(self.inputs):
-            slope = self.polynomial.derivative(number)
-            text = f'Derivative of {name} by {each}.'
-            functions.append(slope.source(f'{name}_by_{each}', self.inputs, text))
-        return '\n\n'.join(functions)
+        slopes = (
+            self.polynomial.derivative(number).source(
+                f'{name}_by_{each}', self.inputs, f'Derivative of {name} by {each}.'
+            )
+            for number, each in enumerate(self.inputs)
+        )
+        return '\n\n'.join([self.polynomial.source(name, self.inputs, note), *slopes])
 
 
 def _check(points: Float64, inputs: Sequence[str], levels: Sequence[int]) -> None:
@@ -519,10 +507,8 @@ def fit_surface(
             break
         fits.append((degree, powers, fit))
     if not fits:
-        raise DataError(
-            'surface',
-            [f'{", ".join(inputs)}: inputs follow from each other. {notes[0]} Leave one out'],
-        )
+        why = f'inputs follow from each other. {notes[0]} Leave one out'
+        raise DataError('surface', [f'{", ".join(inputs)}: {why}'])
     table = OrderTable.of(
         [len(powers) for _, powers, _ in fits],
         [fit.sse for _, _, fit in fits],
@@ -536,13 +522,7 @@ def fit_surface(
             'there may be more in the data.'
         )
     degree, powers, fit = fits[chosen]
-    return Surface(
-        inputs=tuple(inputs),
-        degree=degree,
-        degrees=tuple(each for each, _, _ in fits),
-        table=table,
-        polynomial=Polynomial(powers, fit.coefficients, centre, half),
-        fit=fit,
-        domain=Domain.of(inputs, points),
-        notes=tuple(notes),
-    )
+    degrees = tuple(each for each, _, _ in fits)
+    polynomial = Polynomial(powers, fit.coefficients, centre, half)
+    domain = Domain.of(inputs, points)
+    return Surface(tuple(inputs), degree, degrees, table, polynomial, fit, domain, tuple(notes))

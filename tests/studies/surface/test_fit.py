@@ -202,7 +202,7 @@ def test_derivatives_raw_powers_and_source(variables: int, degree: int, seed: in
             polynomial.gradient(points)[:, j],
             atol=1e-12 * size / polynomial.half[j],
         )
-    raw = polynomial.raw() @ polynomial.coefficients
+    raw = polynomial.raw @ polynomial.coefficients
     terms = monomials(points, polynomial.powers) * raw
     # raw powers cancel: hence the scaling inside
     np.testing.assert_allclose(terms.sum(axis=1), value, atol=1e-12 * np.abs(terms).sum())

@@ -42,11 +42,10 @@ LINES: dict[str, dict[str, Any]] = {
     'tangent': {'color': VERMILION, 'linestyle': '--'},
 }
 SURFACES: dict[drag.CableSurface, dict[str, Any]] = {
-    drag.CableSurface.SMOOTH: {'color': BLUE, 'linestyle': '-'},
-    drag.CableSurface.ROUGH: {'color': VERMILION, 'linestyle': '--'},
+    drag.CableSurface.SMOOTH: LINES['C V²'],
+    drag.CableSurface.ROUGH: LINES['tangent'],
 }
 RANGE_COLOR = '#eef3f7'
-_HIGHEST_U = 2.5
 
 
 def coefficient_picture(cable: drag.Cable) -> Figure:
@@ -56,12 +55,8 @@ def coefficient_picture(cable: drag.Cable) -> Figure:
     with one_axis(9.0, 3.4) as (figure, axis):
         slenderness = np.geomspace(drag.SHORTEST, drag.LONGEST, 200)
         for surface, style in SURFACES.items():
-            axis.semilogx(
-                slenderness,
-                drag.drag_coefficient(slenderness, surface),
-                label=f'{surface} cylinder',
-                **style,
-            )
+            c0 = drag.drag_coefficient(slenderness, surface)
+            axis.semilogx(slenderness, c0, label=f'{surface} cylinder', **style)
         axis.semilogx([cable.slenderness], [cable.c0], 'o', color='#1a1a1a', label='this cable')
         axis.set(xlabel='length over diameter [-]', ylabel='C0, on length times diameter [-]')
         axis.legend()
@@ -74,7 +69,7 @@ def tangent_picture(tangent: drag.Tangent, tolerance: float) -> Figure:
     """
     v0 = tangent.speed_m_s
     low, high = drag.tangent_range(tolerance)
-    u = np.linspace(0.0, _HIGHEST_U, 251)
+    u = np.linspace(0.0, 2.5, 251)
     speed = u * v0
     with styled():
         figure = new_figure(9.0, 6.0)
@@ -90,12 +85,8 @@ def tangent_picture(tangent: drag.Tangent, tolerance: float) -> Figure:
         bottom.plot(moving, 100.0 * drag.tangent_error(its_u), **LINES['tangent'])
         bottom.plot(moving, 100.0 * drag.naive_error(moving), **LINES['C V'])
         bottom.axhline(0.0, color=BLUE, linewidth=1.0)
-        bottom.set(
-            ylim=(-105.0, 105.0),
-            ylabel='error of the lines [%]',
-            xlabel='speed [m/s]',
-            xlim=(0.0, speed[-1]),
-        )
+        bottom.set(ylim=(-105.0, 105.0), ylabel='error of the lines [%]')
+        bottom.set(xlim=(0.0, speed[-1]), xlabel='speed [m/s]')
         for axis in (top, bottom):
             span = low * v0, min(high * v0, speed[-1])
             axis.axvspan(*span, color=RANGE_COLOR, zorder=0, label='where the tangent may be used')
@@ -188,17 +179,17 @@ def shown(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Present
         yield _COEFFICIENT, coefficient_picture(cable), measured
 
     tables = (
-        ('Figures of the cable', facts(cable, tangent, tolerance)),
-        ('Errors of the lines: each over the drag, less one', errors(tangent, tolerance)),
+        ('Figures of the cable', _facts(cable, tangent, tolerance)),
+        ('Errors of the lines: each over the drag, less one', _errors(tangent, tolerance)),
     )
     area = tangent.drag.drag_area_m2
     on_a_ship = f'On a ship: shipdrag simulate --effect towed_cable={area:.6g} ...'
     return Presentation(
         'Drag of a towed cable, and a line in place of it',
-        sentence(cable, tangent, tolerance),
+        _sentence(cable, tangent, tolerance),
         [
             Section(_LINES, tables=tables),
-            Section('Before it is used', lines=(*notes(cable), on_a_ship)),
+            Section('Before it is used', lines=(*_notes(cable), on_a_ship)),
             Section(_COEFFICIENT),
         ],
         pictures(),
@@ -206,15 +197,10 @@ def shown(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Present
     )
 
 
-def sentence(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> str:
-    """
-    Say what the drag is, which line may replace it, and where.
-    """
-    kind = (
-        f'{cable.drag} cable'
-        if isinstance(cable.drag, drag.CableSurface)
-        else 'cable with a stated C0'
-    )
+def _sentence(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> str:
+    """Say what the drag is, which line may replace it, and where."""
+    is_known = isinstance(cable.drag, drag.CableSurface)
+    kind = f'{cable.drag} cable' if is_known else 'cable with a stated C0'
     low, high = drag.tangent_range(tolerance)
     upward = f'to {high * tangent.speed_m_s:.4g} m/s (u = V/V0 from {low:.4f} to {high:.4f})'
     if not math.isfinite(high):
@@ -228,10 +214,8 @@ def sentence(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> str:
     )
 
 
-def facts(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Table:
-    """
-    Show the figures of a cable.
-    """
+def _facts(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Table:
+    """Show the figures of a cable."""
     low, high = drag.tangent_range(tolerance)
     v0, percent = tangent.speed_m_s, f'{100.0 * tolerance:.3g} %'
     return Table(
@@ -250,10 +234,8 @@ def facts(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Table:
     )
 
 
-def errors(tangent: drag.Tangent, tolerance: float) -> Table:
-    """
-    Show what the lines err at speeds about V0.
-    """
+def _errors(tangent: drag.Tangent, tolerance: float) -> Table:
+    """Show what the lines err at speeds about V0."""
     u, naive, touching = drag.compare_errors(tangent.speed_m_s, tolerance).T
     return by_columns(
         {
@@ -265,14 +247,10 @@ def errors(tangent: drag.Tangent, tolerance: float) -> Table:
     )
 
 
-def notes(cable: drag.Cable) -> tuple[str, ...]:
-    """
-    Say what has to be known before the figures are used.
-    """
+def _notes(cable: drag.Cable) -> tuple[str, ...]:
+    """Say what has to be known before the figures are used."""
     low, high = drag.PUBLISHED_RANGE
-    at_low, at_high = (
-        f'{100.0 * float(drag.tangent_error(u)):.1f} %' for u in drag.PUBLISHED_RANGE
-    )
+    at_low, at_high = (f'{100.0 * each:.1f} %' for each in drag.tangent_error((low, high)))
     return (
         *(f'WARNING: {warning}' for warning in cable.warnings),
         f'The source states 10 % for u from {low:g} to {high:g}; by its own formula the tangent '

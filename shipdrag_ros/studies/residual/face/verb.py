@@ -158,13 +158,13 @@ def shown(
     tables = (
         *asked,
         ('Coefficients of the form', coefficients(found)),
-        ('Ranges of the data; outside their convex hull nothing is to be used', domain(found)),
+        ('Ranges of the data; outside their convex hull nothing is to be used', _domain(found)),
     )
     return Presentation(
         f'{target} by ratios of the hull',
-        sentence(found, target, predictions),
+        _sentence(found, target, predictions),
         [
-            Section(text=(technical(found), f'{target} {_ABOUT}')),
+            Section(text=(_technical(found), f'{target} {_ABOUT}')),
             Section(
                 'What these data can and cannot show' if found.notes else '', lines=found.notes
             ),
@@ -175,10 +175,8 @@ def shown(
     )
 
 
-def sentence(found: fit.ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
-    """
-    Say in words what was found.
-    """
+def _sentence(found: fit.ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
+    """Say in words what was found."""
     said = (
         f'{target} by the form of {found.form.name.capitalize()}, fitted to {found.count} hulls, '
         f'{len(found.hulls)} rows.'
@@ -191,10 +189,8 @@ def sentence(found: fit.ResidualFit, target: str, predictions: Sequence[Predicti
     return said
 
 
-def technical(found: fit.ResidualFit) -> str:
-    """
-    Say how well the data determine the form.
-    """
+def _technical(found: fit.ResidualFit) -> str:
+    """Say how well the data determine the form."""
     rank, count = found.fit.rank, len(found.fit.coefficients)
     open_ones = '' if rank == count else f': {count - rank} combination(s) of terms stay open'
     return (
@@ -217,10 +213,8 @@ def coefficients(found: fit.ResidualFit) -> Table:
     )
 
 
-def domain(found: fit.ResidualFit) -> Table:
-    """
-    Show the ranges of the data.
-    """
+def _domain(found: fit.ResidualFit) -> Table:
+    """Show the ranges of the data."""
     return by_columns(
         {
             '': found.domain.names,

@@ -30,16 +30,10 @@ def particulars_picture(found: CoastStudy) -> Figure:
     table = found.losses.table[found.losses.order]
     places = np.arange(len(order))[::-1]
     with one_axis(9.0, 0.8 + 0.28 * len(order)) as (figure, axis):
-        axis.barh(
-            places, table[:, :2].mean(axis=1), color=PALE, height=0.7, label='10 per cent wrong'
-        )
-        axis.barh(
-            places,
-            np.nan_to_num(table[:, 4:6].mean(axis=1)),
-            color=BLUE,
-            height=0.35,
-            label='wrong by the stated standard deviation',
-        )
+        wrong, stated = table[:, :2].mean(axis=1), np.nan_to_num(table[:, 4:6].mean(axis=1))
+        axis.barh(places, wrong, color=PALE, height=0.7, label='10 per cent wrong')
+        label = 'wrong by the stated standard deviation'
+        axis.barh(places, stated, color=BLUE, height=0.35, label=label)
         axis.axvline(1.0, color='#555555', linewidth=0.8, label='noise of one sample')
         axis.set_xscale('log')
         axis.set_yticks(places, order)
@@ -55,8 +49,7 @@ def mimic_picture(found: CoastStudy) -> Figure:
     """
     places = np.arange(len(found.mimics))[::-1]
     with one_axis(9.0, 0.8 + 0.28 * len(places)) as (figure, axis):
-        left = [mimic.left for mimic in found.mimics]
-        axis.barh(places, left, color=BLUE, height=0.65)
+        axis.barh(places, [mimic.left for mimic in found.mimics], color=BLUE, height=0.65)
         for place, mimic in zip(places, found.mimics):
             text = f'{mimic.value} {mimic.wrong_by:+.0%}'
             axis.text(mimic.left + 0.01, place, text, va='center', fontsize=7)
@@ -76,7 +69,6 @@ MIMICS = (
     'Effects of the library at a usual size, and the wrong value that each may be taken for; '
     'left: what of the effect such an error does not explain'
 )
-_LOOKS_ALIKE = 0.05  # of an effect is left
 _CLOSE = 0.1  # relative error
 _LARGE = 0.5  # relative error; beyond it only that it is larger is said
 
@@ -131,7 +123,7 @@ def notes(found: CoastStudy) -> tuple[str, ...]:
     Say what was done and what it means.
     """
     scenario, check = found.coast.scenario, found.check
-    near = [mimic for mimic in found.mimics if mimic.left < _LOOKS_ALIKE]
+    near = [mimic for mimic in found.mimics if mimic.left < 0.05]
     alike = '; '.join(f'{mimic.effect} like {mimic.value} {mimic.wrong_by:+.0%}' for mimic in near)
     said = [
         f'A coastdown of {scenario.duration_s:.0f} s from {scenario.speed_m_s:.2f} m/s, one '
@@ -155,7 +147,7 @@ def notes(found: CoastStudy) -> tuple[str, ...]:
         said.append(
             f'To within a twentieth of what they do, effects look like a wrong value: {alike}.'
         )
-    if any(not math.isfinite(value) for value in found.losses.table[:, :4].flat):
+    if not np.isfinite(found.losses.table[:, :4]).all():
         said.append(
             'A dash stands where so large a change leaves the table of the baseline, or where no '
             'standard deviation is stated.'

@@ -51,21 +51,12 @@ def ranking_picture(found: steering.SteeringStudy) -> Figure:
     """
     losses, order = found.losses, found.losses.ranking
     places = np.arange(len(order))[::-1]
+    means, count = losses.mean[losses.order], len(found.selection.kept)
     with one_axis(9.0, 0.8 + 0.2 * len(order)) as (figure, axis):
-        count = len(found.selection.kept)
-        for part, color, label in (
-            (slice(0, count), BLUE, 'kept'),
-            (slice(count, None), face.PALE, 'set to 0'),
-        ):
-            axis.barh(places[part], losses.mean[losses.order][part], color=color, label=label)
-        axis.plot(
-            found.mean_norms.mean[losses.order],
-            places,
-            linestyle='none',
-            marker='|',
-            color=VERMILION,
-            label='by the mean norm',
-        )
+        axis.barh(places[:count], means[:count], color=BLUE, label='kept')
+        axis.barh(places[count:], means[count:], color=face.PALE, label='set to 0')
+        by_mean = found.mean_norms.mean[losses.order]
+        axis.plot(by_mean, places, '|', color=VERMILION, label='by the mean norm')
         if found.selection.threshold > 0.0:
             axis.axvline(found.selection.threshold, color='#555555', linewidth=0.8)
         axis.set_xscale('log')
@@ -116,16 +107,10 @@ def design_picture(shown: steering.Experiment) -> Figure:
     manoeuvres = [manoeuvre.name for manoeuvre in shown.manoeuvres]
     with one_axis(9.0, 3.0, {'axes.grid': False}) as (figure, axis):
         largest = float(np.max(shown.loss))
-        image = axis.imshow(
-            np.maximum(shown.loss.T, 1e-5 * largest),
-            norm=LogNorm(1e-4 * largest, largest),
-            cmap='Blues',
-            aspect='auto',
-        )
-        best = np.argmax(shown.loss, axis=1)
-        axis.plot(
-            np.arange(len(best)), best, linestyle='none', marker='o', color=ORANGE, markersize=4
-        )
+        norm = LogNorm(1e-4 * largest, largest)
+        floored = np.maximum(shown.loss.T, 1e-5 * largest)
+        image = axis.imshow(floored, norm=norm, cmap='Blues', aspect='auto')
+        axis.plot(np.argmax(shown.loss, axis=1), 'o', color=ORANGE, markersize=4)
         axis.set_xticks(np.arange(len(shown.names)), shown.names, rotation=90)
         axis.set_yticks(np.arange(len(manoeuvres)), manoeuvres)
         axis.set(xlabel='derivative', ylabel='manoeuvre')
@@ -146,13 +131,8 @@ DESIGN = (
     'contribution: the part of it that is orthogonal to the responses of all others'
 )
 
-MEANINGS = 'What the derivatives are: which force, and what it grows with'
-
-_RANKING, _CHECKED, _SAILED = (
-    'How much each matters',
-    'The model without the others',
-    'Which manoeuvre to sail',
-)
+_RANKING, _CHECKED = 'How much each matters', 'The model without the others'
+_SAILED = 'Which manoeuvre to sail'
 
 
 def shown(found: steering.SteeringStudy, sailed: steering.Experiment) -> Presentation:
@@ -185,7 +165,8 @@ def shown(found: steering.SteeringStudy, sailed: steering.Experiment) -> Present
         yield _SAILED, design_picture(sailed), design
 
     order = found.losses.ranking
-    meanings = {'derivative': order, 'what it is': map(meaning, order)}
+    meanings = by_columns({'derivative': order, 'what it is': map(meaning, order)})
+    caption = 'What the derivatives are: which force, and what it grows with'
     return Presentation(
         f'Which derivatives matter: {found.ship.name}',
         sentence(found),
@@ -194,7 +175,7 @@ def shown(found: steering.SteeringStudy, sailed: steering.Experiment) -> Present
             Section(_RANKING, tables=((LOSSES, loss_table(found)),)),
             Section(_CHECKED, tables=((CHECK, check_table(found)),)),
             Section(_SAILED, tables=((DESIGN, design_table(sailed)),)),
-            Section('What the names mean', tables=((MEANINGS, by_columns(meanings)),)),
+            Section('What the names mean', tables=((caption, meanings),)),
         ],
         pictures(),
         source=found.ship.source,
@@ -266,28 +247,18 @@ def check_table(found: steering.SteeringStudy) -> Table:
     Show how close the reduced models come.
     """
     ship, kept = found.ship, found.selection.kept
-    rows = [
+    grouped, independent = f'{len(found.group_derivatives)}', f'{found.independent}'
+    rows = (
         ('full', f'{len(ship.viscous)}', f'{len(ship.groups)}', *_degrees(found.check, 0)),
-        ('kept', f'{len(kept)}', f'{found.independent}', *_degrees(found.check, 1)),
-        (
-            'kept by measurement',
-            f'{len(found.group_derivatives)}',
-            f'{found.independent}',
-            *_degrees(found.group_check, 1),
-        ),
-    ]
-    heads = (
-        steering.CHECKED_BY.name,
-        'derivatives',
-        'measurements',
-        'overshoot 1 [deg]',
-        'overshoot 2 [deg]',
-        'rms u [m/s]',
-        'v [m/s]',
-        'r [deg/s]',
-        'heading [deg]',
+        ('kept', f'{len(kept)}', independent, *_degrees(found.check, 1)),
+        ('kept by measurement', grouped, independent, *_degrees(found.group_check, 1)),
     )
-    return Table(heads, tuple(rows))
+    heads = (
+        *(steering.CHECKED_BY.name, 'derivatives', 'measurements'),
+        *('overshoot 1 [deg]', 'overshoot 2 [deg]'),
+        *('rms u [m/s]', 'v [m/s]', 'r [deg/s]', 'heading [deg]'),
+    )
+    return Table(heads, rows)
 
 
 def _degrees(check: steering.ReducedModelCheck, model: int) -> tuple[str, ...]:
@@ -296,13 +267,8 @@ def _degrees(check: steering.ReducedModelCheck, model: int) -> tuple[str, ...]:
     if model == 0:
         return (*over, '-', '-', '-', '-')
     surge, sway, yaw, heading = check.rms_difference.values()
-    return (
-        *over,
-        f'{surge:.3f}',
-        f'{sway:.3f}',
-        f'{np.degrees(yaw):.3f}',
-        f'{np.degrees(heading):.2f}',
-    )
+    turned = f'{np.degrees(yaw):.3f}', f'{np.degrees(heading):.2f}'
+    return (*over, f'{surge:.3f}', f'{sway:.3f}', *turned)
 
 
 def design_table(shown: steering.Experiment) -> Table:

@@ -55,9 +55,8 @@ def degree_picture(surface: Surface) -> Figure:
         axis.plot(surface.degrees, np.sqrt(surface.table.variance), color=BLUE, marker='o')
         if np.all(surface.table.variance > 0.0):
             axis.set_yscale('log')
-        axis.axvline(
-            surface.degree, color=VERMILION, linestyle='--', label=f'chosen: {surface.degree}'
-        )
+        label = f'chosen: {surface.degree}'
+        axis.axvline(surface.degree, color=VERMILION, linestyle='--', label=label)
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
         axis.set(xlabel='degree', ylabel='RMSE')
         axis.legend()
@@ -105,10 +104,9 @@ def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
 
     inside = leverage <= 1.0
     with one_axis(9.0, 3.0) as (figure, axis):
+        beyond = leverage[~inside], error[~inside]
         axis.semilogx(leverage[inside], error[inside], '.', color=BLUE, label='within')
-        axis.semilogx(
-            leverage[~inside], error[~inside], 'x', color=VERMILION, label='beyond the data'
-        )
+        axis.semilogx(*beyond, 'x', color=VERMILION, label='beyond the data')
         axis.axvline(1.0, color='#777777', linestyle='--')
         axis.axhline(0.0, color='#777777', linewidth=1.0)
         axis.set_xlabel('leverage over the largest of the other hulls [1]')
@@ -162,7 +160,7 @@ def run(options: argparse.Namespace) -> int:
     if options.export is not None:
         options.export.write_text(found.source(target), encoding='utf-8')
         output.log(f'function in {options.export}')
-    content = document(found)
+    content = _document(found)
     if asked is not None:
         slopes = found.polynomial.gradient(asked)
         content['predictions'] = [
@@ -173,10 +171,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def document(found: Surface) -> dict[str, Any]:
-    """
-    Return the document of a surface.
-    """
+def _document(found: Surface) -> dict[str, Any]:
+    """Return the document of a surface."""
     table = found.table
     tried = (table.coefficients, table.sse, np.sqrt(table.variance), table.f, table.p)
     terms = (found.polynomial.powers, found.coefficients, found.sd)
@@ -254,9 +250,8 @@ def shown(
 def _names(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(','))
     if not all(names) or len(set(names)) < len(names):
-        raise argparse.ArgumentTypeError(
-            f'{text!r}, expected different columns separated by commas'
-        )
+        why = f'{text!r}, expected different columns separated by commas'
+        raise argparse.ArgumentTypeError(why)
     return names
 
 
