@@ -344,7 +344,7 @@ def test_what_slows_a_boat_quickly_is_no_power_reduced() -> None:
     monitor = Monitor(boat, Parameters(), estimate=refuse, final=refuse)
     events = [*monitor.update(block), *monitor.finish()]
     (ended,) = standing(events)
-    assert dismissed(events) == []
+    assert {each.reason for each in dismissed(events)} <= {Dismissal.PLATEAU}
     assert abs(after_s(ended.start_ns, 600.0)) <= 5.0
 
 

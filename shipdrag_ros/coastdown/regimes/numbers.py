@@ -217,7 +217,6 @@ ANNOUNCE = _grid(
     '1',
     'P(gliding) above; below, with that of the glide announced: an end is not taken back',
 )
-HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 
 EXPLAINED_SHARE = _grid(
