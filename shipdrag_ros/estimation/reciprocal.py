@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.errors import EstimationError
@@ -33,7 +34,7 @@ _LARGEST_CURRENT = 0.4  # of the lowest speed
 @dataclass(frozen=True)
 class Combined(ForceCurve):
     """
-    r(v) in calm deep water from several coastdowns, inside the valid range of every run.
+    r(v) in calm deep water from several coastdowns, each inside its valid range.
 
     The mean is weighted by the repeatable variances; the repeatable sigma is widened where the
     runs differ by more than it says.
@@ -41,7 +42,7 @@ class Combined(ForceCurve):
     Attributes
     ----------
     scatter_m_s2 : (m,)
-        Standard deviation of one run about the mean.
+        Standard deviation of one run about the mean; NaN at speeds that one run alone reaches.
     runs
         How many.
     current_m_s, current_sigma_m_s
@@ -155,14 +156,27 @@ def _agreement(
 
 
 def _grid(curves: Sequence[ResistanceCurve], shifts: Float64) -> Float64:
-    low = max(float(curve.speed_m_s[0]) - s for curve, s in zip(curves, shifts))
-    high = min(float(curve.speed_m_s[-1]) - s for curve, s in zip(curves, shifts))
-    if not high > low:
+    lows, highs = np.array([each.speed_m_s[[0, -1]] for each in curves]).T - shifts
+    speed = np.linspace(lows.min(), highs.max(), _POINTS)
+    if not _reach(curves, shifts, speed).any(axis=0).all():
         raise EstimationError(
             f'the valid ranges of the {len(curves)} coastdowns do not overlap: from '
-            f'{low:.3g} m/s up, but to {high:.3g} m/s only; give runs over the same speeds'
+            f'{lows.max():.3g} m/s up, but to {highs.min():.3g} m/s only; give runs over the same '
+            'speeds'
         )
-    return np.linspace(low, high, _POINTS)
+    return speed
+
+
+def _reach(
+    curves: Sequence[ResistanceCurve], shifts: Float64, speed: Float64
+) -> NDArray[np.bool_]:
+    """Say which runs reach which speeds, (runs, m)."""
+    lows, highs = np.array([each.speed_m_s[[0, -1]] for each in curves]).T - shifts
+    slack = 1e-9 * speed[-1]
+    reached: NDArray[np.bool_] = (lows[:, None] <= speed + slack) & (
+        speed - slack <= highs[:, None]
+    )
+    return reached
 
 
 def _shared(estimate: Estimate, curve: ResistanceCurve) -> Float64:
@@ -189,7 +203,7 @@ def _mean_r(
     speed = _grid(curves, shifts)
     r = _at(curves, [each.resistance_m_s2 for each in curves], shifts, speed)
     variance = _at(curves, [each.sigma_repeatable_m_s2**2 for each in curves], shifts, speed)
-    weight = 1.0 / variance
+    weight = _reach(curves, shifts, speed) / variance
     return speed, r, weight, (weight * r).sum(axis=0) / weight.sum(axis=0)
 
 
@@ -210,17 +224,19 @@ def _mean(
     share = weight / weight.sum(axis=0)
     # what the runs share is in each weight as if it were of that run alone
     common = (share * rest).sum(axis=0) ** 2 - (share**2 * rest**2).sum(axis=0)
-    runs, first = len(curves), curves[0]
-    excess = max(1.0, _chi2(r, weight, mean) / (runs - 1))
+    more, first = (weight > 0.0).sum(axis=0) - 1, curves[0]
+    excess = max(1.0, _chi2(r, weight, mean) / max(more.mean(), 1.0))
+    there = np.ma.masked_array(r, weight == 0.0)
+    scatter = np.where(more > 0, there.std(axis=0, ddof=1).filled(np.nan), np.nan)
     repeatable = np.sqrt(excess / weight.sum(axis=0) + common)
     return Combined(
         speed_m_s=speed,
         resistance_m_s2=mean,
         sigma_m_s2=np.hypot(repeatable, (share * of_n_r).sum(axis=0)),
         sigma_repeatable_m_s2=repeatable,
-        scatter_m_s2=r.std(axis=0, ddof=1),
+        scatter_m_s2=scatter,
         froude=speed * float(first.froude[-1] / first.speed_m_s[-1]),
-        runs=runs,
+        runs=len(curves),
         current_m_s=current,
         current_sigma_m_s=current_sigma,
     )

@@ -404,7 +404,7 @@ def combined_table(combined: Combined) -> Table:
             (
                 display.speed_text(speed, highest_m_s=float(combined.speed_m_s[-1])),
                 f'{combined.froude[i]:.3f}',
-                *(f'{column[i]:.{decimals}f}' for column in figures),
+                *(f'{column[i]:.{decimals}f}'.replace('nan', '-') for column in figures),
             )
         )
     heads = ('speed [m/s]', 'Fr', 'r [m/s²]', 'sigma [m/s²]', 'run to run [m/s²]')

@@ -14,6 +14,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.words import combined_table
 from shipdrag_ros.library.record import estimate as of
 from shipdrag_ros.library.simulated import simulate
 from shipdrag_ros.parameters import Parameters
@@ -92,6 +93,19 @@ def test_wind_that_is_measured_is_out_of_the_mean_though_the_depth_is_not_known(
     np.testing.assert_allclose(both.resistance_m_s2, clean, rtol=0.03)
 
 
+def test_a_short_run_takes_nothing_from_a_long_one(coast, ship) -> None:
+    one, other = (run(coast, ship, current_m_s=0.0, seed=seed, log=True) for seed in (1, 2))
+    low, high = one.froude_valid
+    short = replace(other, froude_valid=(0.5 * (low + high), high))
+    both = combine([one, short], [0.0, 0.0])
+    np.testing.assert_allclose(both.speed_m_s[[0, -1]], one.valid_calm.speed_m_s[[0, -1]])
+    alone = both.speed_m_s < 0.99 * short.valid_calm.speed_m_s[0]
+    assert np.isnan(both.scatter_m_s2[alone]).all()
+    of_one = np.interp(both.speed_m_s, one.calm.speed_m_s, one.calm.resistance_m_s2)
+    np.testing.assert_allclose(both.resistance_m_s2[alone], of_one[alone], rtol=1e-3)
+    assert combined_table(both).rows[0][-1] == '-'
+
+
 def test_no_heading_no_current(coast, ship) -> None:
     runs = [run(coast, ship, current_m_s=0.0, seed=seed, log=False) for seed in (1, 2)]
     assert combine(runs, [None, None]).current_m_s is None
@@ -103,6 +117,7 @@ def test_refusals_say_why(coast, ship) -> None:
         combine([one], [0.0])
     low, high = one.froude_valid
     middle = 0.5 * (low + high)
-    halves = [replace(one, froude_valid=(low, middle)), replace(one, froude_valid=(middle, high))]
+    less, more = 0.9 * middle, 1.1 * middle
+    halves = [replace(one, froude_valid=(low, less)), replace(one, froude_valid=(more, high))]
     with pytest.raises(EstimationError, match='do not overlap'):
         combine(halves, [0.0, 0.0])
