@@ -216,7 +216,7 @@ def differing(sizes: Sequence[RunSize]) -> str:
     )
     name = sizes[0].parameter.replace('_', ' ')
     return (
-        f'These runs differ: no one state of the hull fits all. {effects}, {name}: {of_runs} (two '
+        f'These runs differ: no one size fits all. {effects}, {name}: {of_runs} (two '
         'standard deviations).'
     )
 

@@ -313,7 +313,7 @@ UNSTATED_FORM = Declared(
 )
 # several runs, and earlier diagnoses
 DIFFERS = Declared(
-    '-', 'chance that an effect of the hull differs between runs of one day', 0.03, '', _TAKEN
+    '-', 'chance that an effect differs between runs of one day', 0.03, '', _TAKEN
 )
 DIFFERS_LATER = Declared('-', 'the same of runs of other days', 0.3, '', _TAKEN)
 EARLIER_ERRS = Declared(

@@ -182,7 +182,7 @@ def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]
     assert found.where.channel == 'force'
     first, second, *_ = words.summary(found)
     assert first.startswith('Missing in the model, and not alike in these runs: fouling')
-    assert second.startswith('These runs differ: no one state of the hull fits all')
+    assert second.startswith('These runs differ: no one size fits all')
 
 
 def test_an_error_of_the_log_that_swings_is_in_the_log(cargo: Ship) -> None:
