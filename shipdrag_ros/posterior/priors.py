@@ -312,9 +312,7 @@ UNSTATED_FORM = Declared(
     '-', 'relative sd of a baseline learnt from runs too few to show it', 0.05, '', _TAKEN
 )
 # several runs, and earlier diagnoses
-DIFFERS = Declared(
-    '-', 'chance that an effect differs between runs of one day', 0.03, '', _TAKEN
-)
+DIFFERS = Declared('-', 'chance that an effect differs between runs of one day', 0.03, '', _TAKEN)
 DIFFERS_LATER = Declared('-', 'the same of runs of other days', 0.3, '', _TAKEN)
 EARLIER_ERRS = Declared(
     '-', 'share of earlier diagnoses that are wrong of an effect', 0.02, '', _TAKEN

@@ -247,7 +247,7 @@ def test_rudder_over_at_the_end_is_cut_and_all_the_time_is_told() -> None:
     rudder = np.where(TIME_S < 220.0, 0.0, -0.5)
     found = judged(block(LOG, noisy(glide(TIME_S))), block(Channel.RUDDER, rudder))
     assert reasons(found) == {Dismissal.TURN}
-    assert kept_s(found) == (0.0, pytest.approx(220.0, abs=3.0 * BIN_S))
+    assert kept_s(found) == (0.0, pytest.approx(220.0, abs=BIN_S))
     always = block(Channel.RUDDER, np.full(len(TIME_S), -0.5))
     found = judged(block(LOG, noisy(glide(TIME_S))), always)
     assert is_whole(found)

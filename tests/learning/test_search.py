@@ -130,9 +130,7 @@ def test_a_hull_that_changed_between_runs_is_said_and_not_learnt() -> None:
     clean, *fouled = (each.size for each in found.runs_differ)
     assert abs(clean.value) < 3.0 * clean.sd
     assert all(abs(each.value - clean.value) > 3.0 * each.sd for each in fouled)
-    assert any(
-        'These runs differ: no one size' in line for line in words.lines(found)
-    )
+    assert any('These runs differ: no one size' in line for line in words.lines(found))
     assert len(words.document(found)['runs_differ']) == 3
     # fouling is held though one size of it fits the runs less well than one of others does
     assert found.probability['fouling'] > 0.05

@@ -17,7 +17,6 @@ from shipdrag_ros.coastdown.regimes.births import LOST
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, rest_speed
 from shipdrag_ros.coastdown.regimes.read_out import (
-    LIKELY,
     Spans,
     median,
     probability_of,
@@ -281,7 +280,7 @@ class WindowRegimes:
         """
         Return first bins, and those after the last, of the stretches that may be so.
         """
-        likely = self.probability[list(which)].sum(axis=0) > LIKELY
+        likely = self.probability[list(which)].sum(axis=0) > n.CLAIM
         likely[: self.binned.before] = False
         return stretches(likely)
 

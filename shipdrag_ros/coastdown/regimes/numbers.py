@@ -217,6 +217,7 @@ ANNOUNCE = _grid(
     '1',
     'P(gliding) above; below, with that of the glide announced: an end is not taken back',
 )
+CLAIM = _number('CLAIM', 0.35, '1', 'least probability of what is kept of a claimed window')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 
 EXPLAINED_SHARE = _grid(

@@ -174,9 +174,9 @@ def vary(
 
     Parameters
     ----------
-    simulate
-        From sets of parameters (k, p) to motions (k, n, q): n times, q quantities without
-        unit. Called once, with 1 + p c sets; the first is unchanged.
+    simulate : (k, p) to (k, n, q)
+        From sets of parameters to motions: n times, q quantities without unit. Called once, with
+        1 + p c sets; the first is unchanged.
     names
         Of the p parameters.
     values : (p,)
