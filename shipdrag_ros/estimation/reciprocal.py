@@ -155,28 +155,19 @@ def _agreement(
     return best, sigma
 
 
-def _grid(curves: Sequence[ResistanceCurve], shifts: Float64) -> Float64:
+def _grid(curves: Sequence[ResistanceCurve], shifts: Float64) -> tuple[Float64, NDArray[np.bool_]]:
+    """Return the speeds (m,), and which runs reach which of them, (runs, m)."""
     lows, highs = np.array([each.speed_m_s[[0, -1]] for each in curves]).T - shifts
     speed = np.linspace(lows.min(), highs.max(), _POINTS)
-    if not _reach(curves, shifts, speed).any(axis=0).all():
+    slack = 1e-9 * speed[-1]
+    reached = (lows[:, None] <= speed + slack) & (speed - slack <= highs[:, None])
+    if not reached.any(axis=0).all():
         raise EstimationError(
             f'the valid ranges of the {len(curves)} coastdowns do not overlap: from '
             f'{lows.max():.3g} m/s up, but to {highs.min():.3g} m/s only; give runs over the same '
             'speeds'
         )
-    return speed
-
-
-def _reach(
-    curves: Sequence[ResistanceCurve], shifts: Float64, speed: Float64
-) -> NDArray[np.bool_]:
-    """Say which runs reach which speeds, (runs, m)."""
-    lows, highs = np.array([each.speed_m_s[[0, -1]] for each in curves]).T - shifts
-    slack = 1e-9 * speed[-1]
-    reached: NDArray[np.bool_] = (lows[:, None] <= speed + slack) & (
-        speed - slack <= highs[:, None]
-    )
-    return reached
+    return speed, reached
 
 
 def _shared(estimate: Estimate, curve: ResistanceCurve) -> Float64:
@@ -200,16 +191,17 @@ def _mean_r(
     curves: Sequence[ResistanceCurve], shifts: Float64
 ) -> tuple[Float64, Float64, Float64, Float64]:
     """Return speeds (m,), r of each run, the weights of the runs, and the mean of r."""
-    speed = _grid(curves, shifts)
+    speed, reached = _grid(curves, shifts)
     r = _at(curves, [each.resistance_m_s2 for each in curves], shifts, speed)
     variance = _at(curves, [each.sigma_repeatable_m_s2**2 for each in curves], shifts, speed)
-    weight = _reach(curves, shifts, speed) / variance
+    weight = reached / variance
     return speed, r, weight, (weight * r).sum(axis=0) / weight.sum(axis=0)
 
 
 def _chi2(r: Float64, weight: Float64, mean: Float64) -> float:
-    """Return chi^2 between the runs, mean over the speeds."""
-    return float((weight * (r - mean) ** 2).sum(axis=0).mean())
+    """Return chi^2 between the runs, mean over the speeds that several reach."""
+    several = np.count_nonzero((weight > 0.0).sum(axis=0) > 1)
+    return float((weight * (r - mean) ** 2).sum() / max(several, 1))
 
 
 def _mean(
@@ -225,7 +217,8 @@ def _mean(
     # what the runs share is in each weight as if it were of that run alone
     common = (share * rest).sum(axis=0) ** 2 - (share**2 * rest**2).sum(axis=0)
     more, first = (weight > 0.0).sum(axis=0) - 1, curves[0]
-    excess = max(1.0, _chi2(r, weight, mean) / max(more.mean(), 1.0))
+    others = more.sum() / max(np.count_nonzero(more), 1)
+    excess = max(1.0, _chi2(r, weight, mean) / max(others, 1.0))
     there = np.ma.masked_array(r, weight == 0.0)
     scatter = np.where(more > 0, there.std(axis=0, ddof=1).filled(np.nan), np.nan)
     repeatable = np.sqrt(excess / weight.sum(axis=0) + common)

@@ -160,9 +160,10 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
     Counts are summed over the bags. A coastdown without an estimate has
     empty arrays and says why under `failure`; `hulls` is there only if they
     were compared. `combined` is one r(v) from two or more coastdowns of one
-    ship: `scatter_m_s2` is the standard deviation of one run about it, the
-    current is along the heading of the first run; where it is null although there
-    are several, `not_combined` says why. `regimes` of a coastdown counts s from its start.
+    ship: `scatter_m_s2` is the standard deviation of one run about it, null at speeds
+    that one alone reaches, the current is along the heading of the first run; where it is
+    null although there are several, `not_combined` says why. `regimes` of a coastdown
+    counts s from its start.
     """
     whole = together(runs)
     found = {

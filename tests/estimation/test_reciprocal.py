@@ -104,6 +104,15 @@ def test_a_short_run_takes_nothing_from_a_long_one(coast, ship) -> None:
     of_one = np.interp(both.speed_m_s, one.calm.speed_m_s, one.calm.resistance_m_s2)
     np.testing.assert_allclose(both.resistance_m_s2[alone], of_one[alone], rtol=1e-3)
     assert combined_table(both).rows[0][-1] == '-'
+    # speeds that one run alone reaches say nothing of how runs differ
+    less = replace(short, calm=replace(short.calm, resistance_m_s2=0.8 * one.calm.resistance_m_s2))
+    apart, whole = (
+        combine([one, each], [0.0, 0.0])
+        for each in (less, replace(less, froude_valid=(low, high)))
+    )
+    top = both.speed_m_s[-2]
+    part, full = (np.interp(top, c.speed_m_s, c.sigma_repeatable_m_s2) for c in (apart, whole))
+    assert part == pytest.approx(full, rel=0.15)
 
 
 def test_no_heading_no_current(coast, ship) -> None:

@@ -217,7 +217,9 @@ ANNOUNCE = _grid(
     '1',
     'P(gliding) above; below, with that of the glide announced: an end is not taken back',
 )
-CLAIM = _number('CLAIM', 0.35, '1', 'least probability of what is kept of a claimed window')
+CLAIM = _number(
+    'CLAIM', 0.35, '1', 'what is kept of a claimed window has more; at 0.5 car_michelin60a is cut'
+)
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 
 EXPLAINED_SHARE = _grid(

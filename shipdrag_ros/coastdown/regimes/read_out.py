@@ -23,8 +23,7 @@ from shipdrag_ros.coastdown.regimes.bank import (
 from shipdrag_ros.coastdown.regimes.state import BankSetting
 from shipdrag_ros.samples import Float64, Int64
 
-LIKELY = 0.5
-"""What is so is more probable than not."""
+_LIKELY = 0.5
 _UNPOWERED = (s.GLIDE, s.BRAKE, s.GLIDE_TURN)
 
 
@@ -171,7 +170,7 @@ def glides(found: Spans, setting: BankSetting, bins: int) -> list[SmoothedGlide]
     found, step_s = found.part(found.what == s.GLIDE), setting.step_s
     likely = probability_of(found._replace(begin_s=found.gone_s), bins, step_s)
     all_of: list[SmoothedGlide] = []
-    for first, last in stretches(likely > LIKELY):
+    for first, last in stretches(likely > _LIKELY):
         shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.gone_s, first * step_s)
         one = shared > 0.5 * (last - first) * step_s
         if not one.any():
@@ -229,10 +228,10 @@ def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float
     likely = probability_of(found.part(np.isin(found.what, _UNPOWERED)), bins, step_s)
     glide = found.part(found.what == s.GLIDE)
     several = []
-    for first, last in stretches(likely > LIKELY):
+    for first, last in stretches(likely > _LIKELY):
         first_s, last_s = first * step_s, last * step_s
         within_s = np.minimum(glide.end_s, last_s) - np.maximum(glide.begin_s, first_s)
-        if glide.weight[within_s > last_s - first_s - spared_s].sum() <= LIKELY:
+        if glide.weight[within_s > last_s - first_s - spared_s].sum() <= _LIKELY:
             several.append((first_s, last_s))
     return several
 
@@ -253,10 +252,10 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSp
     ]
     glided = probability_of(found.part(found.what == s.GLIDE), len(speed), step_s)[first:last]
     most = int(np.argmax([loss.sum() for loss in losses[:-1]]))
-    best = len(codes) - 1 if glided.min() > LIKELY else most
+    best = len(codes) - 1 if glided.min() > _LIKELY else most
     if not losses[best].sum() > 0.0:
         return None
     share, part = (found.weight * shared)[parts[best]], found.part(parts[best])
     share /= share.sum()
-    again = float(share[part.again].sum()) > LIKELY
+    again = float(share[part.again].sum()) > _LIKELY
     return LostSpeed(codes[best], median(part.begin_s, share), again, losses[best])
