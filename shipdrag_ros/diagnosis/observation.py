@@ -280,7 +280,7 @@ class Context:
     def __len__(self) -> int:
         return len(self.value)
 
-    def predict(self, columns: Columns, actions: Sequence[Action], stop_s: float) -> Float64:
+    def predict(self, columns: Columns, actions: Sequence[Action], stop_s: Float64) -> Float64:
         """
         Return what columns predict, (k, c).
 
@@ -290,7 +290,7 @@ class Context:
             Of one simulation.
         actions
             What acts in each column.
-        stop_s
+        stop_s : (k,) or one
             Time of the stop [s].
 
         Returns
@@ -298,6 +298,7 @@ class Context:
         (k, c)
             A line a column, in the order of `value`.
         """
+        stops_s = np.broadcast_to(stop_s, len(actions))[:, None]
         cos, sin = math.cos(self.stop.heading_rad), math.sin(self.stop.heading_rad)
         place = columns.radar_position_m[:, self.at_port]
         velocity = columns.velocity_over_ground_m_s[:, self.at_wind]
@@ -309,13 +310,13 @@ class Context:
             depth = np.array([action.depth_m for action in actions]) / self.draught_m
             parts.append(np.log(np.clip(depth, 1.0, _DEEP_DRAUGHTS))[:, None])
         if len(self.at_shaft):
-            parts += self._shafts(columns, actions, stop_s)
-        after = columns.time_s[self.at_yaw] - stop_s
-        yaw = np.zeros((len(actions), len(after)))
+            parts += self._shafts(columns, actions, stops_s)
+        after = columns.time_s[self.at_yaw] - stops_s
+        yaw = np.zeros_like(after)
         for i, action in enumerate(actions):
             for turn in action.turns:
                 if turn.rate_rad_s:  # a force that goes by the time is many turns without one
-                    yaw[i] += turn.turned_rad(after)
+                    yaw[i] += turn.turned_rad(after[i])
         parts.append(yaw)
         if self.run_down_s is not None:
             parts.append(np.array([[self._log_fall(self.run_down_s, each)] for each in actions]))
@@ -329,7 +330,9 @@ class Context:
         fall_s = (1.0 - fraction) * own + fraction * action.residual_decay_s
         return math.log(max(fall_s, _SHORTEST_S))
 
-    def _shafts(self, columns: Columns, actions: Sequence[Action], stop_s: float) -> list[Float64]:
+    def _shafts(
+        self, columns: Columns, actions: Sequence[Action], stop_s: Float64
+    ) -> list[Float64]:
         """Return shaft speeds over the steady one, and how odd it is that the shaft stands."""
         after = columns.time_s[self.at_shaft] - stop_s
         speed = columns.speed_through_water_m_s[:, self.at_shaft]
@@ -720,20 +723,26 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
 
 def _simulating(
     run: Observation, frame: Frame
-) -> Callable[[Sequence[Action], Float64, float], SimulatedRows]:
+) -> Callable[[Sequence[Action], Float64 | float, Float64 | float], SimulatedRows]:
     first, length = frame.scenario.lead_in_s, frame.scenario.length_s
 
-    def simulate(actions: Sequence[Action], speed_m_s: Float64, later_s: float) -> SimulatedRows:
-        lead_in_s = min(max(first + later_s, 1.0), length - 1.0)  # within the record
-        scenario = replace(frame.scenario, lead_in_s=lead_in_s, duration_s=length - lead_in_s)
+    def simulate(
+        actions: Sequence[Action], speed_m_s: Float64 | float, later_s: Float64 | float
+    ) -> SimulatedRows:
+        stop_s = np.clip(first + later_s, 1.0, length - 1.0)  # within the record
         try:
             columns = simulate_columns(
-                frame.ship, scenario, actions, run.time_s, speed_m_s=speed_m_s
+                frame.ship,
+                frame.scenario,
+                actions,
+                run.time_s,
+                speed_m_s=speed_m_s,
+                later_s=stop_s - first,
             )
         except SimulationError as error:  # of a speed that the baseline does not hold
             raise SimulationError(f'{run.name}: {error}') from error
         along, ahead = rows_of(run, columns)
-        rest = run.context.predict(columns, actions, lead_in_s)
+        rest = run.context.predict(columns, actions, stop_s)
         return SimulatedRows(along, rest, ahead[:, run.context.at_port])
 
     return simulate

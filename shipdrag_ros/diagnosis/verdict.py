@@ -394,7 +394,7 @@ def percent_of_r(comparing: Comparing, name: str, bound: float) -> float:
     run = runs.runs[0]
     began = runs.began(0, comparing.nothing.at)
     actions = began.still, began.still + way.action(run.frame, z)
-    shown = run.simulate(actions, np.full(2, began.speed_m_s), began.later_s).along
+    shown = run.simulate(actions, began.speed_m_s, began.later_s).along
     rows, model = run.model.rows, run.model
     by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
     late = by_log & (rows.time_s > RUN_DOWNS * max(model.forces.tau_s, 1.0))

@@ -504,7 +504,7 @@ class Comparing:
         ways = [each.ways[-1] for each in hypotheses]
         more = [way.action(run.frame, way.tried(), j) for way in ways]
         actions = [whole, *(whole + each for each in more)]
-        shown = run.simulate(actions, np.full(len(actions), began.speed_m_s), began.later_s)
+        shown = run.simulate(actions, began.speed_m_s, began.later_s)
         change = np.hstack([shown.along, shown.rest])
         change = change[1:] - change[0]
         change[~np.isfinite(change).all(axis=1)] = 0.0

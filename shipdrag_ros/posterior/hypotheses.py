@@ -90,7 +90,7 @@ class RunSight:
     shaft
         Whether it is measured after its fall.
     simulate
-        From actions and steady speeds (m,), and by how much the stop is later than in the frame.
+        From actions (m,), steady speeds, and by how much the stop is later than in the frame.
     """
 
     model: RunModel
@@ -102,7 +102,7 @@ class RunSight:
     stated_run_down_s: float
     scatter: float
     shaft: bool
-    simulate: Callable[[Sequence[Action], Float64, float], SimulatedRows]
+    simulate: Callable[[Sequence[Action], Float64 | float, Float64 | float], SimulatedRows]
 
     @cached_property
     def over_run(self) -> Float64:
@@ -193,7 +193,7 @@ class Explanation:
 
 @dataclass
 class _Asked:
-    """Columns of simulations, one for each time of the stop; each column is there once."""
+    """Columns of one simulation; each is there once."""
 
     numbers: dict[tuple[float, Action, float], int] = field(default_factory=dict)
 
@@ -201,16 +201,8 @@ class _Asked:
         return self.numbers.setdefault((began.later_s, action, began.speed_m_s), len(self.numbers))
 
     def simulate(self, run: RunSight) -> SimulatedRows:
-        by_stop: dict[float, list[tuple[int, Action, float]]] = {}
-        for (later_s, action, speed_m_s), number in self.numbers.items():
-            by_stop.setdefault(later_s, []).append((number, action, speed_m_s))
-        parts, order = [], list[int]()
-        for later_s, columns in by_stop.items():
-            numbers, actions, speeds = zip(*columns, strict=True)
-            parts.append(run.simulate(actions, np.array(speeds), later_s))
-            order += numbers
-        back = np.argsort(order)
-        return SimulatedRows(*(np.concatenate(each)[back] for each in zip(*parts, strict=True)))
+        later_s, actions, speed_m_s = zip(*self.numbers, strict=True)
+        return run.simulate(actions, np.array(speed_m_s), np.array(later_s))
 
 
 class _Began(NamedTuple):

@@ -109,7 +109,8 @@ def simulate_columns(
     actions: Sequence[Action],
     time_s: Float64,
     *,
-    speed_m_s: Float64 | None = None,
+    speed_m_s: Float64 | float | None = None,
+    later_s: Float64 | float = 0.0,
     reference_rad: float | None = None,
     step_s: float | None = None,
 ) -> Columns:
@@ -126,8 +127,10 @@ def simulate_columns(
         k of them; their values are taken as they are.
     time_s : (m,)
         When to look, ascending, within the record [s].
-    speed_m_s : (k,), optional
+    speed_m_s : (k,) or one, optional
         Steady speed before the stop, by column; the scenario's by default.
+    later_s : (k,) or one
+        By how much later the stop, and all after it, is than the scenario says [s].
     reference_rad
         Heading of the first run, as in `simulate`.
     step_s
@@ -158,33 +161,40 @@ def simulate_columns(
     own = own_action(ship, scenario, reference_rad=reference_rad)
     if own != Action():
         actions = [own + action for action in actions]
-    prepared = _prepare(ship, scenario, actions, speed_m_s, step_s)
+    speeds = scenario.speed_m_s if speed_m_s is None else speed_m_s
+    records = columns_of(ship, scenario, actions, speed_m_s=speeds, later_s=later_s)
+    prepared = _prepare(ship, scenario, actions, records, step_s)
+    stop_s = scenario.lead_in_s + records['later_s']
     seen = time
-    if any(action.log_lag_s or action.log_late_s or action.ground_lag_s for action in actions):
-        seen = np.unique(np.concatenate([time, _looks_s(ship, scenario)]))
+    slow = [any((a.log_lag_s, a.log_late_s, a.ground_lag_s)) for a in actions]
+    looks = {later: _looks_s(ship, scenario, later) for later in set(records['later_s'][slow])}
+    seen = np.unique(np.concatenate([time, *looks.values()]))
     whole = prepared.paths(seen)
     paths = whole[prepared.motion[:, np.newaxis], np.searchsorted(seen, time)]
     speed, position, velocity = paths[:, :, 0], paths[:, :, 1:3], paths[:, :, 3:]
     log = speed.copy()
     for i, action in enumerate(actions):
         for error in action.log_error:
-            log[i] += error(speed[i], time - scenario.lead_in_s)
+            log[i] += error(speed[i], time - stop_s[i])
     factor, offset = np.array([(a.log_factor, a.log_offset_m_s) for a in actions]).T[:, :, None]
     log = (1.0 + factor) * log + offset
     over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
-    for i, action in enumerate(actions):
-        path = whole[prepared.motion[i]]
+    for i in np.flatnonzero(slow).tolist():
+        # as it is seen alone, whatever else is looked at
+        action = actions[i]
+        at: Float64 = np.union1d(time, looks[records['later_s'][i]])
+        path = whole[prepared.motion[i], np.searchsorted(seen, at)]
         if action.log_lag_s or action.log_late_s:
-            log[i] = log_reading(action, seen, path[:, 0], time, scenario.lead_in_s)
+            log[i] = log_reading(action, at, path[:, 0], time, stop_s[i])
         if action.ground_lag_s > 0.0:
             moved = np.hypot(path[:, 3], path[:, 4])
-            over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))
+            over_ground[i] = np.interp(time, at, lagged(at, moved, action.ground_lag_s))
     radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
     read = radar[:, :, None] * position, radar * over_ground
     return Columns(time, speed, position, velocity, log, *read)
 
 
-def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
+def _looks_s(ship: Ship, scenario: Scenario, later_s: float) -> Float64:
     """Return when a motion must be followed to be read late, straight lines between."""
     longest = _longest_step_s(ship, scenario.speed_m_s)
     run_down = run_down_s(ship, Action())
@@ -196,19 +206,18 @@ def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
     for start, end in pairwise([*scenario.events_s(), scenario.length_s]):
         even = np.arange(start + steps.sum(), end, longest)
         looks += [np.array([start]), (start + np.cumsum(steps))[:-1], even]
-    found = np.concatenate(looks)
-    return found[found <= scenario.length_s]
+    found = np.concatenate(looks) + later_s
+    return found[(found >= 0.0) & (found <= scenario.length_s)]
 
 
 def _prepare(
     ship: Ship,
     scenario: Scenario,
     actions: Sequence[Action],
-    speed_m_s: Float64 | None,
+    records: Records,
     step_s: float | None,
 ) -> _Prepared:
     law = law_of(ship, scenario.speed_m_s)
-    speeds = np.full(len(actions), scenario.speed_m_s) if speed_m_s is None else speed_m_s
     also = _also_s(ship, scenario, actions, step_s)
     longest = _longest_step_s(ship, scenario.speed_m_s)
     legs: list[Records] = []
@@ -224,7 +233,6 @@ def _prepare(
             first = sum(map(len, legs))
             legs.append(legs_of(ship, of_column, edges, steps))
             places[action.turns] = first, first + len(steps)
-    records = columns_of(ship, scenario, actions, speed_m_s=speeds)
     motions: dict[tuple[object, ...], int] = {}
     motion = [
         motions.setdefault((record.tobytes(), action.resistance, action.turns), len(motions))

@@ -43,10 +43,10 @@ class SurgeLaw(NamedTuple):
     air_1_m: float
 
 
-# what one column adds to the law; a wave's direction is a unit vector, its force and all else
-# per unit of the stated mass
+# what one column adds to the law, `later_s` after its legs say so; a wave's direction is a unit
+# vector, its force and all else per unit of the stated mass
 _OF_COLUMN = (
-    *('speed_m_s', 'wind_east_m_s', 'wind_north_m_s'),
+    *('speed_m_s', 'later_s', 'wind_east_m_s', 'wind_north_m_s'),
     *('wave_m_s2', 'wave_east', 'wave_north', 'wave_encounter_s_m'),
     *('current_east_m_s', 'current_north_m_s'),
     *('change_east_m_s2', 'change_north_m_s2', 'change_from_s'),
@@ -207,7 +207,7 @@ def follow(
     gust_m_s2, water_m_s : (n + 1,) or (0,)
         Disturbances at all steps, linear between.
     time_s : (m,)
-        When to look, ascending, within the legs.
+        When to look, ascending; later than the legs, the last one goes on.
     path : (m, 5)
         Filled with speed through water, x, y, and the velocity over ground.
 
@@ -216,9 +216,10 @@ def follow(
     Runge-Kutta of fourth order with its interpolant of third order between
     the steps; all forces are smooth within a leg.
     """
-    u, x, y = column.speed_m_s, 0.0, 0.0
+    u, later = column.speed_m_s, column.later_s
     cos, sin = np.cos(legs[0].yaw_rad), np.sin(legs[0].yaw_rad)
     east, north = column.current_east_m_s, column.current_north_m_s
+    x, y = later * (u * cos + east), later * (u * sin + north)
     ground = (u + east * cos + north * sin, north * cos - east * sin)
     steady = _retardation_m_s2(law, column, extra, u, ground, cos, sin, 0.0)
     nominal = residual = 1.0  # thrust over the steady one, were it all of this kind
@@ -228,7 +229,9 @@ def follow(
     for i_leg in range(len(legs)):
         leg = legs[i_leg]
         h = leg.step_s
-        length = h * leg.steps
+        steps, length = leg.steps, h * leg.steps
+        if later < 0.0 and i_leg == len(legs) - 1:
+            steps = max(steps, int(np.ceil((time_s[-1] - later - leg.start_s) / h)))
         heading = (np.cos(leg.yaw_rad), np.sin(leg.yaw_rad))
         ordered = leg.thrust_ordered
         above = nominal - ordered if column.run_down_s > 0.0 else 0.0
@@ -243,7 +246,7 @@ def follow(
             nominal += above * np.exp(-length / column.run_down_s)
         if above_residual != 0.0:
             residual += above_residual * np.exp(-length / column.residual_decay_s)
-        for step in range(leg.steps):
+        for step in range(steps):
             if disturbed:
                 gust, water = gust_m_s2[done], water_m_s[done]
                 gust_change = gust_m_s2[done + 1] - gust
@@ -266,9 +269,9 @@ def follow(
             u4, x4, y4 = _rates(
                 law, column, extra, leg, thrust, heading, end, u + h * u3, g, w, rate
             )
-            is_last = i_leg == len(legs) - 1 and step == leg.steps - 1
-            while sample < len(time_s) and (is_last or time_s[sample] < leg.start_s + end):
-                p = (time_s[sample] - leg.start_s - start) / h
+            is_last = i_leg == len(legs) - 1 and step == steps - 1
+            while sample < len(time_s) and (is_last or time_s[sample] - later < leg.start_s + end):
+                p = (time_s[sample] - later - leg.start_s - start) / h
                 b1 = h * p * (1.0 - p * (1.5 - p * (2.0 / 3.0)))
                 b2 = h * p * p * (1.0 - p * (2.0 / 3.0))
                 b4 = h * p * p * (p * (2.0 / 3.0) - 0.5)

@@ -169,7 +169,7 @@ def simulate(
     """
     action = own_action(ship, scenario, reference_rad=reference_rad, effects=effects)
     law = law_of(ship, scenario.speed_m_s)
-    [column] = columns_of(ship, scenario, [action], speed_m_s=np.array([scenario.speed_m_s]))
+    [column] = columns_of(ship, scenario, [action], speed_m_s=scenario.speed_m_s)
     scenario = acted(scenario, action)
     changes = any(action.current_change_m_s)
     edges = edges_of(scenario, also_s=[scenario.lead_in_s] if changes else [])
@@ -337,15 +337,22 @@ def extra_of(ship: Ship, law: SurgeLaw, actions: Sequence[Action]) -> Float64:
 
 
 def columns_of(
-    ship: Ship, scenario: Scenario, actions: Sequence[Action], *, speed_m_s: Float64
+    ship: Ship,
+    scenario: Scenario,
+    actions: Sequence[Action],
+    *,
+    speed_m_s: Float64 | float,
+    later_s: Float64 | float = 0.0,
 ) -> Records:
     """
     Return what else the kernel must know of each action.
 
     Parameters
     ----------
-    speed_m_s : (k,)
+    speed_m_s : (k,) or one
         Steady speed before the stop.
+    later_s : (k,) or one
+        By how much later all happens [s].
 
     Returns
     -------
@@ -354,10 +361,12 @@ def columns_of(
     """
     records = np.zeros(len(actions), COLUMN)
     records['speed_m_s'] = speed_m_s
+    records['later_s'] = later_s
     records['change_from_s'] = scenario.lead_in_s
-    per_s = 1.0 / scenario.duration_s if scenario.duration_s > 0.0 else 0.0
+    left_s = scenario.duration_s - records['later_s']
+    per_s = np.divide(1.0, left_s, out=np.zeros(len(actions)), where=left_s > 0.0)
     east, north = scenario.current_m_s
-    for record, action in zip(records, actions):
+    for record, action, a_second in zip(records, actions, per_s):
         record['wind_east_m_s'], record['wind_north_m_s'] = action.wind_m_s
         wave = hypot(*action.wave_force_n)
         if wave > 0.0:
@@ -366,8 +375,8 @@ def columns_of(
             record['wave_north'] = action.wave_force_n[1] / wave
         record['current_east_m_s'] = east + action.current_m_s[0]
         record['current_north_m_s'] = north + action.current_m_s[1]
-        record['change_east_m_s2'] = action.current_change_m_s[0] * per_s
-        record['change_north_m_s2'] = action.current_change_m_s[1] * per_s
+        record['change_east_m_s2'] = action.current_change_m_s[0] * a_second
+        record['change_north_m_s2'] = action.current_change_m_s[1] * a_second
     records['run_down_s'] = [run_down_s(ship, action) for action in actions]
     as_they_are = 'wave_encounter_s_m', 'residual_fraction', 'residual_decay_s'
     for name in (*as_they_are, 'n_r_change', 'mass_fraction'):

@@ -274,7 +274,7 @@ def test_what_an_effect_does_begins_with_the_stop_of_each_hypothesis(runs: ShipR
         at[stop] = later_s
         began = runs.began(0, at)
         actions = [began.still, began.still + hypothesis.actions(run.frame, 0, at[runs.size :])[0]]
-        along = run.simulate(actions, np.full(2, began.speed_m_s), began.later_s).along
+        along = run.simulate(actions, began.speed_m_s, began.later_s).along
         shown[later_s] = (along[1] - along[0])[by_log]
     time_s = rows.time_s[by_log]
     after = (time_s > 60.0) & (time_s < time_s[-1] - 50.0)

@@ -29,6 +29,7 @@ from shipdrag_ros.simulation import (
 )
 from shipdrag_ros.simulation.columns import _prepare, _steps
 from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.surge import columns_of
 from tests.runs import CARGO
 
 SCENARIO = Scenario(
@@ -245,7 +246,8 @@ def test_a_motion_is_followed_once_however_instruments_read_it() -> None:
     turned = Action(turns=(Turn(100.0, 50.0, 0.002),))
     late, scaled = Action(log_lag_s=5.0, ground_lag_s=3.0), Action(radar_factor=0.1)
     actions = [Action(), late, turned, scaled, turned + late, Action(n_r_change=0.1)]
-    prepared = _prepare(CARGO, SCENARIO, actions, None, None)
+    records = columns_of(CARGO, SCENARIO, actions, speed_m_s=SCENARIO.speed_m_s)
+    prepared = _prepare(CARGO, SCENARIO, actions, records, None)
     assert prepared.motion.tolist() == [0, 0, 1, 0, 1, 2]
     assert len(prepared.paths(TIME_S)) == 3
     together = simulate_columns(CARGO, SCENARIO, actions, TIME_S)
@@ -257,3 +259,23 @@ def test_a_motion_is_followed_once_however_instruments_read_it() -> None:
         assert np.array_equal(alone.log_m_s[0], together.log_m_s[i])
         assert np.array_equal(alone.radar_position_m[0], together.radar_position_m[i])
         assert np.array_equal(alone.radar_speed_m_s[0], together.radar_speed_m_s[i])
+
+
+@pytest.mark.parametrize('later_s', [-7.3, 12.9])
+def test_a_later_stop_is_that_of_another_scenario(later_s: float) -> None:
+    turn = Turn(100.0, 50.0, 0.002, drag_area_m2=9.0)
+    actions = [
+        Action(wind_m_s=(3.0, 1.0), turns=(turn,)),
+        Action(log_lag_s=5.0, ground_lag_s=3.0, log_late_s=-2.0),
+        Action(current_change_m_s=(0.3, 0.0), log_error=(lambda speed, after: 1e-3 * after,)),
+    ]
+    shown = simulate_columns(
+        CARGO, SCENARIO, actions * 2, TIME_S, later_s=np.repeat([0.0, later_s], 3)
+    )
+    for part, later in ((slice(3), 0.0), (slice(3, 6), later_s)):
+        whole = SCENARIO.lead_in_s + later, SCENARIO.duration_s - later
+        scenario = replace(SCENARIO, lead_in_s=whole[0], duration_s=whole[1])
+        other = simulate_columns(CARGO, scenario, actions, TIME_S)
+        for name in ('log_m_s', 'radar_speed_m_s', 'radar_position_m'):
+            found, expected = getattr(shown, name)[part], getattr(other, name)
+            np.testing.assert_allclose(found, expected, atol=0.1 if 'position' in name else 1e-3)

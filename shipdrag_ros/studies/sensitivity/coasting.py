@@ -189,10 +189,7 @@ class Coast:
         the simulation leaves the baseline's table. `speed_m_s` before the stop
         is the scenario's by default.
         """
-        speed = self.scenario.speed_m_s if speed_m_s is None else speed_m_s
-        columns = simulate_columns(
-            ship, self.scenario, actions, self.time_s, speed_m_s=np.full(len(actions), speed)
-        )
+        columns = simulate_columns(ship, self.scenario, actions, self.time_s, speed_m_s=speed_m_s)
         place = columns.radar_position_m / POSITION_SD_M
         return np.concatenate([columns.log_m_s[..., None] / LOG_SD_M_S, place], axis=-1)
 
