@@ -230,6 +230,7 @@ def _prepare(
                 steps = _steps(ship, of_column, edges, longest)
             else:
                 steps = steps_of(ship, of_column, edges, step_s=step_s)
+            edges, steps = [*edges, edges[-1] + longest], [*steps, 1]  # goes on for what is later
             first = sum(map(len, legs))
             legs.append(legs_of(ship, of_column, edges, steps))
             places[action.turns] = first, first + len(steps)

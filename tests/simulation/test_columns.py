@@ -267,12 +267,13 @@ def test_a_later_stop_is_that_of_another_scenario(later_s: float) -> None:
     actions = [
         Action(wind_m_s=(3.0, 1.0), turns=(turn,)),
         Action(log_lag_s=5.0, ground_lag_s=3.0, log_late_s=-2.0),
+        Action(turns=(Turn(700.0, 100.0 - 1e-9, 0.002),)),  # nearly until the record ends
         Action(current_change_m_s=(0.3, 0.0), log_error=(lambda speed, after: 1e-3 * after,)),
     ]
     shown = simulate_columns(
-        CARGO, SCENARIO, actions * 2, TIME_S, later_s=np.repeat([0.0, later_s], 3)
+        CARGO, SCENARIO, actions * 2, TIME_S, later_s=np.repeat([0.0, later_s], 4)
     )
-    for part, later in ((slice(3), 0.0), (slice(3, 6), later_s)):
+    for part, later in ((slice(4), 0.0), (slice(4, 8), later_s)):
         whole = SCENARIO.lead_in_s + later, SCENARIO.duration_s - later
         scenario = replace(SCENARIO, lead_in_s=whole[0], duration_s=whole[1])
         other = simulate_columns(CARGO, scenario, actions, TIME_S)
