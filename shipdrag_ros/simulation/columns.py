@@ -165,7 +165,6 @@ def simulate_columns(
     records = columns_of(ship, scenario, actions, speed_m_s=speeds, later_s=later_s)
     prepared = _prepare(ship, scenario, actions, records, step_s)
     stop_s = scenario.lead_in_s + records['later_s']
-    seen = time
     slow = [any((a.log_lag_s, a.log_late_s, a.ground_lag_s)) for a in actions]
     looks = {later: _looks_s(ship, scenario, later) for later in set(records['later_s'][slow])}
     seen = np.unique(np.concatenate([time, *looks.values()]))
