@@ -9,7 +9,7 @@ acts on the ship and in nothing else: each is a column.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -94,10 +94,11 @@ class _Prepared:
     legs: Records
     own_legs: NDArray[np.int64]
 
-    def paths(self, time_s: Float64) -> Float64:
+    def paths(self, time_s: Float64, motions: NDArray[np.int64] | slice = slice(None)) -> Float64:
         """Return what `follow` does, a path a motion (p, m, 5)."""
-        paths = np.empty((len(self.records), len(time_s), 5))
-        follow_columns(self.law, self.records, self.extra, self.legs, self.own_legs, time_s, paths)
+        of_each = self.records[motions], self.extra[motions]
+        paths = np.empty((len(of_each[0]), len(time_s), 5))
+        follow_columns(self.law, *of_each, self.legs, self.own_legs[motions], time_s, paths)
         lost = np.maximum.accumulate(outside(self.law, paths[:, :, 0]), axis=1)
         paths[lost] = np.nan
         return paths
@@ -165,11 +166,7 @@ def simulate_columns(
     records = columns_of(ship, scenario, actions, speed_m_s=speeds, later_s=later_s)
     prepared = _prepare(ship, scenario, actions, records, step_s)
     stop_s = scenario.lead_in_s + records['later_s']
-    slow = [any((a.log_lag_s, a.log_late_s, a.ground_lag_s)) for a in actions]
-    looks = {later: _looks_s(ship, scenario, later) for later in set(records['later_s'][slow])}
-    seen = np.unique(np.concatenate([time, *looks.values()]))
-    whole = prepared.paths(seen)
-    paths = whole[prepared.motion[:, np.newaxis], np.searchsorted(seen, time)]
+    paths = prepared.paths(time)[prepared.motion]
     speed, position, velocity = paths[:, :, 0], paths[:, :, 1:3], paths[:, :, 3:]
     log = speed.copy()
     for i, action in enumerate(actions):
@@ -178,16 +175,17 @@ def simulate_columns(
     factor, offset = np.array([(a.log_factor, a.log_offset_m_s) for a in actions]).T[:, :, None]
     log = (1.0 + factor) * log + offset
     over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
-    for i in np.flatnonzero(slow).tolist():
-        # as it is seen alone, whatever else is looked at
-        action = actions[i]
-        at: Float64 = np.union1d(time, looks[records['later_s'][i]])
-        path = whole[prepared.motion[i], np.searchsorted(seen, at)]
-        if action.log_lag_s or action.log_late_s:
-            log[i] = log_reading(action, at, path[:, 0], time, stop_s[i])
-        if action.ground_lag_s > 0.0:
-            moved = np.hypot(path[:, 3], path[:, 4])
-            over_ground[i] = np.interp(time, at, lagged(at, moved, action.ground_lag_s))
+    late = np.array([any((a.log_lag_s, a.log_late_s, a.ground_lag_s)) for a in actions])
+    for later in np.unique(records['later_s'][late]).tolist():
+        mine = np.flatnonzero(late & (records['later_s'] == later))
+        seen: Float64 = np.union1d(time, _looks_s(ship, scenario, later))
+        for i, path in zip(mine.tolist(), prepared.paths(seen, prepared.motion[mine])):
+            action = actions[i]
+            if action.log_lag_s or action.log_late_s:
+                log[i] = log_reading(action, seen, path[:, 0], time, stop_s[i])
+            if action.ground_lag_s > 0.0:
+                moved = np.hypot(path[:, 3], path[:, 4])
+                over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))
     radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
     read = radar[:, :, None] * position, radar * over_ground
     return Columns(time, speed, position, velocity, log, *read)
@@ -220,19 +218,22 @@ def _prepare(
     also = _also_s(ship, scenario, actions, step_s)
     longest = _longest_step_s(ship, scenario.speed_m_s)
     legs: list[Records] = []
-    places: dict[tuple[Turn, ...], tuple[int, int]] = {}
-    for action in actions:
-        if action.turns not in places:
+    places: dict[tuple[tuple[Turn, ...], float], tuple[int, int]] = {}
+    # what is earlier than the scenario says goes on for longer after it
+    over_s = np.maximum(-records['later_s'], 0.0).tolist()
+    keys = [(action.turns, over) for action, over in zip(actions, over_s)]
+    for action, over, key in zip(actions, over_s, keys):
+        if key not in places:
             of_column = acted(scenario, action) if action.turns else scenario
+            of_column = replace(of_column, duration_s=of_column.duration_s + over)
             edges = edges_of(of_column, also_s=also)
             if step_s is None:
                 steps = _steps(ship, of_column, edges, longest)
             else:
                 steps = steps_of(ship, of_column, edges, step_s=step_s)
-            edges, steps = [*edges, edges[-1] + longest], [*steps, 1]  # goes on for what is later
             first = sum(map(len, legs))
             legs.append(legs_of(ship, of_column, edges, steps))
-            places[action.turns] = first, first + len(steps)
+            places[key] = first, first + len(steps)
     motions: dict[tuple[object, ...], int] = {}
     motion = [
         motions.setdefault((record.tobytes(), action.resistance, action.turns), len(motions))
@@ -240,7 +241,7 @@ def _prepare(
     ]
     once = np.unique(motion, return_index=True)[1]
     moving = [actions[i] for i in once]
-    own_legs = np.array([places[action.turns] for action in moving])
+    own_legs = np.array([places[keys[i]] for i in once])
     extra = extra_of(ship, law, moving)
     return _Prepared(np.array(motion), law, records[once], extra, np.concatenate(legs), own_legs)
 

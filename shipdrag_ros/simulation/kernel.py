@@ -207,7 +207,7 @@ def follow(
     gust_m_s2, water_m_s : (n + 1,) or (0,)
         Disturbances at all steps, linear between.
     time_s : (m,)
-        When to look, ascending; later than the legs, the last one goes on.
+        When to look, ascending, within the legs, `later_s` after they say so.
     path : (m, 5)
         Filled with speed through water, x, y, and the velocity over ground.
 
@@ -229,9 +229,7 @@ def follow(
     for i_leg in range(len(legs)):
         leg = legs[i_leg]
         h = leg.step_s
-        steps, length = leg.steps, h * leg.steps
-        if later < 0.0 and i_leg == len(legs) - 1:
-            steps = max(steps, int(np.ceil((time_s[-1] - later - leg.start_s) / h)))
+        length = h * leg.steps
         heading = (np.cos(leg.yaw_rad), np.sin(leg.yaw_rad))
         ordered = leg.thrust_ordered
         above = nominal - ordered if column.run_down_s > 0.0 else 0.0
@@ -246,7 +244,7 @@ def follow(
             nominal += above * np.exp(-length / column.run_down_s)
         if above_residual != 0.0:
             residual += above_residual * np.exp(-length / column.residual_decay_s)
-        for step in range(steps):
+        for step in range(leg.steps):
             if disturbed:
                 gust, water = gust_m_s2[done], water_m_s[done]
                 gust_change = gust_m_s2[done + 1] - gust
@@ -269,7 +267,7 @@ def follow(
             u4, x4, y4 = _rates(
                 law, column, extra, leg, thrust, heading, end, u + h * u3, g, w, rate
             )
-            is_last = i_leg == len(legs) - 1 and step == steps - 1
+            is_last = i_leg == len(legs) - 1 and step == leg.steps - 1
             while sample < len(time_s) and (is_last or time_s[sample] - later < leg.start_s + end):
                 p = (time_s[sample] - later - leg.start_s - start) / h
                 b1 = h * p * (1.0 - p * (1.5 - p * (2.0 / 3.0)))

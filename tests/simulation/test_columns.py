@@ -261,19 +261,20 @@ def test_a_motion_is_followed_once_however_instruments_read_it() -> None:
         assert np.array_equal(alone.radar_speed_m_s[0], together.radar_speed_m_s[i])
 
 
-@pytest.mark.parametrize('later_s', [-7.3, 12.9])
+@pytest.mark.parametrize('later_s', [-40.0, -7.3, 12.9])
 def test_a_later_stop_is_that_of_another_scenario(later_s: float) -> None:
     turn = Turn(100.0, 50.0, 0.002, drag_area_m2=9.0)
     actions = [
         Action(wind_m_s=(3.0, 1.0), turns=(turn,)),
         Action(log_lag_s=5.0, ground_lag_s=3.0, log_late_s=-2.0),
         Action(turns=(Turn(700.0, 100.0 - 1e-9, 0.002),)),  # nearly until the record ends
+        Action(turns=(Turn(760.0, 43.0, 0.001, 200.0, edge_s=8.0), Turn(815.0, 50.0, 0.0, 500.0))),
         Action(current_change_m_s=(0.3, 0.0), log_error=(lambda speed, after: 1e-3 * after,)),
     ]
     shown = simulate_columns(
-        CARGO, SCENARIO, actions * 2, TIME_S, later_s=np.repeat([0.0, later_s], 4)
+        CARGO, SCENARIO, actions * 2, TIME_S, later_s=np.repeat([0.0, later_s], 5)
     )
-    for part, later in ((slice(4), 0.0), (slice(4, 8), later_s)):
+    for part, later in ((slice(5), 0.0), (slice(5, 10), later_s)):
         whole = SCENARIO.lead_in_s + later, SCENARIO.duration_s - later
         scenario = replace(SCENARIO, lead_in_s=whole[0], duration_s=whole[1])
         other = simulate_columns(CARGO, scenario, actions, TIME_S)
