@@ -366,7 +366,7 @@ class DiagnosisResult:
     facts
         All that were stated, with what the data say of each.
     runs_differ
-        Where one state of the hull does not fit all runs: the size in each. The
+        Where no one size of an effect fits all runs: the size in each. The
         effects above have that of the last run.
     runs
         That it rests on.

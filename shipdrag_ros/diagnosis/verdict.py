@@ -531,14 +531,14 @@ def where(
     named
         Effects of the answer.
     of_force
-        Whether it is known to be in the force.
+        Whether it is known to be in the force, where no instrument alone is named.
 
     Returns
     -------
     Where
         The ends hold 90 % of the excess over noise.
     """
-    channel = FORCE if of_force else _falsified(named) or _channel(case.found)
+    channel = _falsified(named) or (FORCE if of_force else _channel(case.found))
     times, speeds = [], []
     residuals = case.comparing.residuals(before)
     for run, residual, table in zip(case.seen, residuals, after.linear, strict=True):

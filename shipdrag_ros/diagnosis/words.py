@@ -206,7 +206,7 @@ def _effort(least: float, limit: Limit) -> float:
 
 def differing(sizes: Sequence[RunSize]) -> str:
     """
-    Say how the runs differ; '' where one state of the hull fits all.
+    Say how the runs differ; '' where one size of all that is missing fits all.
     """
     if not sizes:
         return ''

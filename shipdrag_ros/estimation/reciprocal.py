@@ -143,7 +143,7 @@ def _agreement(
 
     def misfit(current: float) -> float:
         _, r, weight, mean = _mean_r(curves, np.where(over_ground, current * along, 0.0))
-        return _chi2(r, weight, mean)
+        return (len(curves) - 1) * _chi2(r, weight, mean)
 
     from scipy.optimize import minimize_scalar  # slow to import
 
@@ -161,7 +161,8 @@ def _grid(curves: Sequence[ResistanceCurve], shifts: Float64) -> tuple[Float64, 
     speed = np.linspace(lows.min(), highs.max(), _POINTS)
     slack = 1e-9 * speed[-1]
     reached = (lows[:, None] <= speed + slack) & (speed - slack <= highs[:, None])
-    if not reached.any(axis=0).all():
+    at_each = reached.sum(axis=0)
+    if at_each.min() < 1 or at_each.max() < 2:
         raise EstimationError(
             f'the valid ranges of the {len(curves)} coastdowns do not overlap: from '
             f'{lows.max():.3g} m/s up, but to {highs.min():.3g} m/s only; give runs over the same '
@@ -199,9 +200,9 @@ def _mean_r(
 
 
 def _chi2(r: Float64, weight: Float64, mean: Float64) -> float:
-    """Return chi^2 between the runs, mean over the speeds that several reach."""
-    several = np.count_nonzero((weight > 0.0).sum(axis=0) > 1)
-    return float((weight * (r - mean) ** 2).sum() / max(several, 1))
+    """Return chi^2 between the runs per degree of freedom, over the speeds that several reach."""
+    free = np.maximum((weight > 0.0).sum(axis=0) - 1, 0).sum()
+    return float((weight * (r - mean) ** 2).sum() / free)
 
 
 def _mean(
@@ -217,8 +218,7 @@ def _mean(
     # what the runs share is in each weight as if it were of that run alone
     common = (share * rest).sum(axis=0) ** 2 - (share**2 * rest**2).sum(axis=0)
     more, first = (weight > 0.0).sum(axis=0) - 1, curves[0]
-    others = more.sum() / max(np.count_nonzero(more), 1)
-    excess = max(1.0, _chi2(r, weight, mean) / max(others, 1.0))
+    excess = max(1.0, _chi2(r, weight, mean))
     there = np.ma.masked_array(r, weight == 0.0)
     scatter = np.where(more > 0, there.std(axis=0, ddof=1).filled(np.nan), np.nan)
     repeatable = np.sqrt(excess / weight.sum(axis=0) + common)

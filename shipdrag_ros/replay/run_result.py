@@ -371,7 +371,11 @@ def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
     low = max(each.valid_calm.speed_m_s[0] for each in usable)
     high = min(each.valid_calm.speed_m_s[-1] for each in usable)
     if low > high:
-        return ''  # no speed in common: `combine` says so
+        return (
+            'these runs are of different dates, and no speed is common to all: whether one '
+            'state of the hull fits them is not shown. Give the runs of one date at a time to '
+            'combine them'
+        )
     speed = float(np.clip(usual_speed_m_s(usable, ship), low, high))
     means = [_mean([each.valid_calm for each in campaign], speed) for campaign in campaigns]
     far = max(

@@ -177,8 +177,8 @@ def combined_notes(combined: Combined) -> tuple[str, ...]:
     return (
         'It is of the ship in calm deep water: what each run shows of its wind and depth is out.',
         current,
-        'Run to run is the standard deviation of one run about the mean of all; where it is '
-        'larger than the runs themselves state, sigma is widened.',
+        'Run to run is the standard deviation of one run about the mean, - where one run alone '
+        'is; where it is larger than the runs themselves state, sigma is widened.',
     )
 
 

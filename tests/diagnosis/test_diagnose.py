@@ -154,19 +154,28 @@ def test_what_two_runs_share_is_named_and_sharper_than_by_one() -> None:
 FACTS = (*map(Fact, ('no_towed_cable', 'deep_water', 'draughts_read')), Fact('shaft', 'free'))
 
 
-def short_run(name: str, fouling: float, seed: int) -> CoastRun:
-    effects = [f'fouling={fouling}'] if fouling else []
+def short_run(name: str, effect: str, size: float, seed: int) -> CoastRun:
+    effects = [f'{effect}={size}'] if size else []
     return coasted(*effects, name=name, coast_s=1000.0, rate_hz=0.5, seed=seed)
 
 
-@pytest.mark.parametrize('sizes', [(0.0, 0.35), (0.3, 0.3)])
-def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]) -> None:
-    runs = [short_run(str(j), fouling, seed=j) for j, fouling in enumerate(sizes)]
+@pytest.mark.parametrize(
+    ('name', 'parameter', 'channel', 'sizes'),
+    [
+        ('fouling', 'friction_factor', 'force', (0.0, 0.35)),
+        ('fouling', 'friction_factor', 'force', (0.3, 0.3)),
+        ('log_scale', 'factor', 'log', (0.0, 0.1)),
+    ],
+)
+def test_runs_differ_where_one_size_does_not_fit_both(
+    name: str, parameter: str, channel: str, sizes: tuple[float, float]
+) -> None:
+    runs = [short_run(str(j), name, size, seed=j) for j, size in enumerate(sizes)]
     found = diagnose(runs, SHIP, Parameters(), facts=FACTS)
     assert found.verdict is Verdict.NAMED
     (effect,) = found.effects
-    assert effect.name == 'fouling'
-    last = effect.parameters['friction_factor']
+    assert effect.name == name
+    last = effect.parameters[parameter]
     assert abs(last.value - sizes[1]) < 3.0 * last.sd
     if sizes[0] == sizes[1]:
         assert found.runs_differ == ()
@@ -174,14 +183,15 @@ def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]
         return
     assert [each.run for each in found.runs_differ] == ['0', '1']
     for each, size in zip(found.runs_differ, sizes, strict=True):
-        assert (each.effect, each.parameter) == ('fouling', 'friction_factor')
+        assert (each.effect, each.parameter) == (name, parameter)
         assert abs(each.size.value - size) < 3.0 * each.size.sd
         assert each.size.sd < 0.08
     assert found.held_out_after is None  # no run tells of another
     assert found.where is not None
-    assert found.where.channel == 'force'
+    assert found.where.channel == channel
     first, second, *_ = words.summary(found)
-    assert first.startswith('Missing in the model, and not alike in these runs: fouling')
+    missing = 'Missing in the model, and not alike in these runs: '
+    assert first.startswith(missing + name.replace('_', ' '))
     assert second.startswith('These runs differ: no one size fits all')
 
 

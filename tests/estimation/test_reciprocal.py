@@ -126,7 +126,7 @@ def test_refusals_say_why(coast, ship) -> None:
         combine([one], [0.0])
     low, high = one.froude_valid
     middle = 0.5 * (low + high)
-    less, more = 0.9 * middle, 1.1 * middle
+    less, more = 0.999 * middle, 1.001 * middle  # a gap narrower than the grid is one
     halves = [replace(one, froude_valid=(low, less)), replace(one, froude_valid=(more, high))]
     with pytest.raises(EstimationError, match='do not overlap'):
         combine(halves, [0.0, 0.0])

@@ -81,6 +81,21 @@ def test_months_later_more_resistance_is_another_state(run: RunResult) -> None:
     assert 'one state of the hull does not fit all' in found.why_not
 
 
+def test_dates_that_share_no_speed_are_not_one_curve(run: RunResult) -> None:
+    parts = []
+    for i, (first, last) in enumerate([(0.0, 0.5), (0.4, 0.7), (0.6, 1.0)]):
+        part = later(run, days=90.0 * i, factor=1.0)
+        (coastdown,) = part.coastdowns
+        assert coastdown.estimate is not None
+        low, high = coastdown.estimate.froude_valid
+        valid = low + first * (high - low), low + last * (high - low)
+        cut = replace(coastdown, estimate=replace(coastdown.estimate, froude_valid=valid))
+        parts.append(replace(part, coastdowns=(cut,)))
+    found = together(parts)
+    assert found.combined is None
+    assert 'of different dates, and no speed is common to all' in found.why_not
+
+
 def test_of_many_dates_the_least_and_the_most_are_named(run: RunResult) -> None:
     found = together([later(run, days=90.0 * i, factor=1.0 + 0.1 * i) for i in range(5)])
     assert 'of 5 dates the least and the most: 2023-11-14: ' in found.why_not
