@@ -29,6 +29,8 @@ from shipdrag_ros.samples import Float64
 _POINTS = 101
 _OPPOSITE = 0.5  # cosine of the angle between runs below which they are separated
 _LARGEST_CURRENT = 0.4  # of the lowest speed
+_TRIED = 41
+_LEAST_SEEN = 1e-3  # of a prior's information: what a run says that has seen nothing
 
 
 @dataclass(frozen=True)
@@ -119,15 +121,19 @@ def _currents(
     of_earth = (calm * priors.CURRENT.sd) ** 2
     prior = of_earth * np.nan_to_num(np.cos(heading_rad[:, None] - heading_rad))
     first = prior[0, at]
-    np.fill_diagonal(prior, of_earth + (calm * priors.CALM_CURRENT.sd) ** 2)
-    prior, error = prior[np.ix_(at, at)], np.outer(by_log * sigma, by_log * sigma)
-    np.fill_diagonal(error, sigma**2)
+    alone = of_earth + (calm * priors.CALM_CURRENT.sd) ** 2
+    np.fill_diagonal(prior, alone)
+    # what each has found is its prior and what it has seen: the prior counts once
+    seen = 1.0 / np.maximum(1.0 / sigma**2 - 1.0 / alone, _LEAST_SEEN / alone)
+    prior, error = prior[np.ix_(at, at)], np.sqrt(np.outer(by_log * seen, by_log * seen))
+    np.fill_diagonal(error, seen)
     weight = np.linalg.inv(prior + error)
-    less[at] = prior @ weight @ value - value
+    said = weight @ (value * seen / sigma**2)
+    less[at] = prior @ said - value
     if not first.any():
         return less, None, None
     variance = of_earth - first @ weight @ first
-    return less, float(first @ weight @ value), math.sqrt(variance)
+    return less, float(first @ said), math.sqrt(variance)
 
 
 def _agreement(
@@ -142,16 +148,24 @@ def _agreement(
     bound = _LARGEST_CURRENT * min(float(curve.speed_m_s[0]) for curve in curves)
 
     def misfit(current: float) -> float:
-        _, r, weight, mean = _mean_r(curves, np.where(over_ground, current * along, 0.0))
+        try:
+            _, r, weight, mean = _mean_r(curves, np.where(over_ground, current * along, 0.0))
+        except EstimationError:  # it parts the ranges: of it the runs say nothing
+            return math.inf
         return (len(curves) - 1) * _chi2(r, weight, mean)
 
     from scipy.optimize import minimize_scalar  # slow to import
 
-    found = minimize_scalar(misfit, bounds=(-bound, bound), method='bounded')
-    best = float(found.x)
+    tried = np.linspace(-bound, bound, _TRIED)
+    costs = [misfit(each) for each in tried]
+    least = int(np.argmin(costs))
+    if math.isinf(costs[least]):
+        return None, None
+    around = tried[max(least - 1, 0)], tried[min(least + 1, _TRIED - 1)]
+    best = float(minimize_scalar(misfit, bounds=around, method='bounded').x)
     step = 1e-3 + 0.05 * bound
     curvature = (misfit(best + step) - 2.0 * misfit(best) + misfit(best - step)) / step**2
-    sigma = math.sqrt(2.0 / curvature) if curvature > 0.0 else bound
+    sigma = math.sqrt(2.0 / curvature) if 0.0 < curvature < math.inf else bound
     return best, sigma
 
 

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, logit
 
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference import decision
@@ -255,7 +255,8 @@ class Comparing:
         may_differ: Sequence[Effect] = (),
     ) -> None:
         self.runs, self.effects, self.log_known = runs, tuple(effects), log_known
-        self.may_differ = tuple(each for each in may_differ if each.scope is not Scope.RUN)
+        several = len(runs.runs) > 1
+        self.may_differ = tuple(e for e in may_differ if several and e.scope is not Scope.RUN)
         self.stated = tuple(stated_way(each, ship) for each in checked(ship).effects)
         self.base = Explanation(self.stated)
         self.noise: list[_RunNoise] = []
@@ -272,6 +273,10 @@ class Comparing:
         }
         for way in kept:
             self.ways[way.effect.name].append(way)
+        for effect in self.may_differ:  # alike, or not: together they are as probable as stated
+            alike = math.log1p(-self._differs(effect))
+            ways = self.ways[effect.name]
+            ways[:] = [replace(way, log_odds=way.log_odds + alike) for way in ways]
 
     @property
     def first(self) -> int:
@@ -754,23 +759,24 @@ class Comparing:
     def _differing(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Return effects with a size for each run: how one fits all tells nothing."""
         count = len(self.runs.runs)
-        if count < 2:
-            return []
         best = ComparedHypotheses(self.effects, tuple(fits)).best
-        apart = self.runs.apart
-        odds = (priors.DIFFERS_LATER if apart else priors.DIFFERS).mean
         found = []
         for alike in (best[e.name,] for e in self.may_differ if (e.name,) in best):
             *stated, way = alike.hypothesis.ways
             own = [replace(way, run=j, log_odds=0.0) for j in range(count)]
-            # of another day the weather is another
-            less = 0.0 if apart and way.effect.scope is Scope.EARTH else math.log(odds)
-            own[0] = replace(own[0], log_odds=way.log_odds + less)
+            own[0] = replace(own[0], log_odds=way.log_odds + logit(self._differs(way.effect)))
             hypothesis = Explanation((*stated, *own))
             at, first, q = self.widened(self.nothing, hypothesis), self.first, len(way.unknowns)
             at[first : first + count * q] = np.tile(alike.at[first : first + q], count)
             found.append(Fitted(hypothesis, at))
         return found
+
+    def _differs(self, effect: Effect) -> float:
+        """Return how probable it is that an effect has a size for each run."""
+        if not self.runs.apart:
+            return priors.DIFFERS.mean
+        of_earth = effect.scope is Scope.EARTH
+        return (priors.DIFFERS_WEATHER if of_earth else priors.DIFFERS_LATER).mean
 
     def _alone(self, fits: Sequence[Fitted]) -> dict[tuple[object, ...], int]:
         """Return the place of each effect by itself."""

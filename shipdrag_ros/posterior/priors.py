@@ -314,6 +314,7 @@ UNSTATED_FORM = Declared(
 # several runs, and earlier diagnoses
 DIFFERS = Declared('-', 'chance that an effect differs between runs of one day', 0.03, '', _TAKEN)
 DIFFERS_LATER = Declared('-', 'the same of runs of other days', 0.3, '', _TAKEN)
+DIFFERS_WEATHER = Declared('-', 'the same of the weather of other days', 0.5, '', _TAKEN)
 EARLIER_ERRS = Declared(
     '-', 'share of earlier diagnoses that are wrong of an effect', 0.02, '', _TAKEN
 )

@@ -43,11 +43,12 @@ def test_current_and_offset_are_taken_out(coast, ship, log: bool, offset_m_s: fl
     back = run(coast, ship, current_m_s=-0.2, seed=2, log=log, offset_m_s=offset_m_s)
     both = combine([there, back], [0.7, 0.7 + math.pi])
     assert both.runs == 2
-    assert both.current_m_s == pytest.approx(0.2, abs=0.05)
+    assert both.current_m_s == pytest.approx(0.2, abs=0.05 if log else 0.1)
+    assert abs(both.current_m_s - 0.2) < 1.96 * both.current_sigma_m_s
     truth = coast.resistance(both.speed_m_s, ship)
     error = both.resistance_m_s2 - truth
     assert np.sqrt(np.mean(error**2)) < (0.02 if log else 0.03) * truth.max()
-    assert not log or np.all(np.abs(error) < 1.96 * both.sigma_m_s2)
+    assert np.all(np.abs(error) < 1.96 * both.sigma_m_s2)
 
 
 def test_runs_that_differ_widen_the_band(coast, ship) -> None:
@@ -112,12 +113,26 @@ def test_a_short_run_takes_nothing_from_a_long_one(coast, ship) -> None:
     )
     top = both.speed_m_s[-2]
     part, full = (np.interp(top, c.speed_m_s, c.sigma_repeatable_m_s2) for c in (apart, whole))
-    assert part == pytest.approx(full, rel=0.15)
+    assert part == pytest.approx(full, rel=0.2)
 
 
 def test_no_heading_no_current(coast, ship) -> None:
     runs = [run(coast, ship, current_m_s=0.0, seed=seed, log=False) for seed in (1, 2)]
     assert combine(runs, [None, None]).current_m_s is None
+
+
+def test_a_current_that_would_part_the_ranges_is_not_that_of_the_runs(coast, ship) -> None:
+    there, back = (run(coast, ship, current_m_s=0.0, seed=seed, log=False) for seed in (1, 2))
+    low, high = there.froude_valid
+    at = low + np.array([0.35, 0.5]) * (high - low)
+    there, back = (
+        replace(there, froude_valid=(at[0], high)),
+        replace(back, froude_valid=(low, at[1])),
+    )
+    both = combine([there, back], [0.0, math.pi])
+    assert both.current_m_s == pytest.approx(0.0, abs=0.1)
+    truth = coast.resistance(both.speed_m_s, ship)
+    assert np.all(np.abs(both.resistance_m_s2 - truth) < 3.0 * both.sigma_m_s2)
 
 
 def test_refusals_say_why(coast, ship) -> None:
@@ -130,3 +145,11 @@ def test_refusals_say_why(coast, ship) -> None:
     halves = [replace(one, froude_valid=(low, less)), replace(one, froude_valid=(more, high))]
     with pytest.raises(EstimationError, match='do not overlap'):
         combine(halves, [0.0, 0.0])
+
+
+def test_positions_without_a_record_before_the_stop_show_her_first_speed(coast, ship) -> None:
+    for seed in (1, 2):
+        found = run(coast, ship, current_m_s=0.0, seed=seed, log=False).valid_calm
+        truth = coast.resistance(found.speed_m_s, ship)
+        assert np.all(np.abs(found.resistance_m_s2 - truth) < 1.96 * found.sigma_m_s2)
+        assert found.resistance_m_s2[-1] > 1.01 * found.resistance_m_s2[-3]

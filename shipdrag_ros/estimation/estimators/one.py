@@ -17,7 +17,7 @@ import numpy as np
 from shipdrag_ros.display import plus_minus
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.estimators import Estimator
-from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows
+from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows, weighted_white_sd
 from shipdrag_ros.estimation.result import AtEnd, Estimate, ResistanceCurve, Track, ValidRange
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
@@ -56,7 +56,8 @@ _WRONG = {  # the sd of a sound instrument, and what another one is
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
 _ABOVE = 1.05  # of the highest median: she was hardly faster
-_BLOCKS, _BLOCKS_OF_SPEED = 12, 48  # whose medians outliers do not reach
+_BLOCKS = 12, 48  # whose medians outliers do not reach
+_SHOWN = 0.01  # of the mean speed, by the medians of positions
 
 
 @dataclass(frozen=True)
@@ -124,8 +125,12 @@ def _speeds(rows: Rows) -> tuple[Float64, Float64]:
     code = min(np.unique(rows.kind).tolist(), key=lambda code: (code % KIND_COUNT, code))
     kind, chosen = code % KIND_COUNT, rows.kind == code
     time_s, value = rows.time_s[chosen], rows.value[chosen]
-    blocks = _BLOCKS if kind == POSITION else _BLOCKS_OF_SPEED
-    edges = np.linspace(0.0, len(time_s), min(blocks, len(time_s) // 4) + 1).astype(np.int64)
+    count, blocks = len(time_s), _BLOCKS[1]
+    if kind == POSITION:  # as many as show how fast she was
+        noise_m = weighted_white_sd(value, np.ones(count))
+        many = (_SHOWN * math.sqrt(count) * float(np.ptp(value)) / max(noise_m, 1e-9)) ** (2 / 3)
+        blocks = int(np.clip(many, *_BLOCKS))
+    edges = np.linspace(0.0, count, min(blocks, count // 4) + 1).astype(np.int64)
     when, speed = block_medians(time_s, edges), block_medians(value, edges)
     if kind == POSITION:
         speed = np.diff(speed) / np.diff(when)
