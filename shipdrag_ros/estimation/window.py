@@ -93,6 +93,8 @@ class Window:
         The log most probably in a wrong scale, and that probability.
     told_ns
         When the engine was stopped, as a person told it [ns]; None where nobody did.
+    found
+        Whether the regimes found it: who gives a window says that she glides in it.
     before
         The record that ends where this window starts, positions in the same
         plane; None where there is none.
@@ -120,6 +122,7 @@ class Window:
     doubted_log: str = 'speed_through_water'
     log_doubt: float = 0.0
     told_ns: int | None = None
+    found: bool = False
     before: Window | None = None
 
     @property

@@ -59,12 +59,15 @@ class StopPrior:
         Of the shaft; 0: not known.
     stands
         Whether all shafts that are read stand after it: then no thrust is left.
+    found
+        Whether nobody claims that nothing but the water slows her after it.
     """
 
     sd_s: float
     run_down_s: float
     run_down_sd_s: float
     stands: bool = False
+    found: bool = True
 
 
 @dataclass(frozen=True)
@@ -378,10 +381,11 @@ class _Option(NamedTuple):
 
 def _after_stop(stop: StopPrior, added: int, level: Float64) -> Iterator[_Option]:
     """Yield what acts after the stop and no input shows; `added` columns begin with `_held`."""
-    if added == 0 or stop.sd_s == 0.0:  # the window is given: who gives it says that she glides
+    if added == 0 or not stop.found:
         yield _Option(1.0)
         return
-    held, left = priors.HELD_CHANCE.mean, 0.0 if stop.stands else priors.LEFT_CHANCE.mean
+    ended = stop.stands or stop.sd_s == 0.0  # of which no thrust is left
+    held, left = priors.HELD_CHANCE.mean, 0.0 if ended else priors.LEFT_CHANCE.mean
     yield _Option(1.0 - held - left)
     force, thrust = priors.HELD, priors.LEFT
     yield _Option(held, ((-added, force.mean, level * force.sd),), priors.HELD_FORCE)

@@ -181,7 +181,13 @@ def estimate(
         variance,
         len(record.steady.time_s),
         ship,
-        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.stands),
+        StopPrior(
+            run_down.stop_sd_s,
+            run_down.shaft_s,
+            run_down.shaft_sd_s,
+            run_down.stands,
+            window.found or run_down.stop_sd_s > 0.0,
+        ),
         # the stop may be before the window: the law reaches up to the speed there
         speeds_m_s=(
             guess.lowest * guess.speed_m_s,
