@@ -11,11 +11,12 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 # what was imported once is compiled: without it each of hundreds of processes does it again
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help env warm demo test lint types tests docs peers lock clean
+.PHONY: help env warm demo test lint types tests coverage docs peers lock clean
 
 help:
 	@echo 'make demo   simulated ship -> ROS topics -> node -> bag -> replay -> report'
 	@echo 'make test   lint, types, tests'
+	@echo 'make coverage  the same tests, and which branches they take (twice as long)'
 	@echo 'make docs   the pages of docs/ as a site, in site'
 	@echo 'make env    only the environment, in $(VENV)'
 	@echo 'make warm   compile now what a first start would compile (a minute)'
@@ -52,6 +53,11 @@ types: env
 
 tests: env
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal  # of three on two cores, one waits for a node
+
+coverage: env warm
+	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n 2 --dist worksteal --timeout 900
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report
 
 docs: env
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir site
