@@ -35,6 +35,11 @@ class Shape(StrEnum):
     FLAT = 'flat'
 
 
+_OF_ONE_SIGN = Shape.HALF_NORMAL, Shape.LOG_NORMAL, Shape.EITHER_SIGN
+_WIDEST = 1.0  # sd of the logarithm of a size that was found ...
+_WIDE = 2.0  # ... and a relative sd that is wider
+
+
 @dataclass(frozen=True)
 class Prior:
     """
@@ -200,6 +205,15 @@ class Prior:
         if self.shape is Shape.EITHER_SIGN:
             return Prior(Shape.LOG_NORMAL, sign * self.first, self.second)
         return self
+
+    def about(self, value: float, sd: float) -> Prior:
+        """
+        Return what is expected of such a parameter that was found; one of one sign keeps it.
+        """
+        if value == 0.0 or sd == 0.0 or self.shape not in _OF_ONE_SIGN:
+            return normal(sd, mean=value)
+        relative = min(sd / abs(value), _WIDE)  # the square of a large one overflows
+        return log_normal(value, min(math.sqrt(math.log1p(relative**2)), _WIDEST))
 
     def __str__(self) -> str:
         a, b = self.first, self.second

@@ -9,6 +9,8 @@ coastdown runs and after it, beside S1's joint problem. Process time, the best o
 
 from __future__ import annotations
 
+import cProfile
+import pstats
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +20,7 @@ import numpy as np
 
 from benchmarks._tables import grid
 from benchmarks.accuracy._coasts import Case, coasts
+from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.distance import refit
 from shipdrag_ros.parameters import Parameters
@@ -94,6 +97,19 @@ def whole(n: int) -> dict[str, Callable[[], object]]:
     }
 
 
+def diagnosed(count: int) -> tuple[float, int]:
+    """
+    Return the time [us] and the Python calls of a diagnosis of so many runs.
+    """
+    found = list(coasts(replace(STEADY, n=1000), count))
+    runs = [CoastRun(f'run {k}', each.window) for k, each in enumerate(found)]
+    call = partial(diagnose, runs, found[0].truth.ship, Parameters())
+    took = best_us(call)
+    with cProfile.Profile() as profile:
+        call()
+    return took, int(pstats.Stats(profile).total_calls)  # type: ignore[attr-defined]
+
+
 def shown(time_us: float) -> str:
     """
     Show a time in the unit that suits it.
@@ -119,6 +135,9 @@ def main() -> None:
     title = f'process time, best of up to {ROUNDS} rounds'
     heads = ('n of each input', *map(str, COUNTS), f'slope from {SLOPE_FROM}')
     grid(title, heads, rows, width=120)
+    for count in (1, 2):
+        took, calls = diagnosed(count)
+        print(f'a diagnosis of {count} run(s), n = 1000: {shown(took)}, {calls:,} Python calls')
 
 
 if __name__ == '__main__':

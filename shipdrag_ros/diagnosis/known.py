@@ -26,7 +26,7 @@ from shipdrag_ros.diagnosis.result import CarriedEffect, SeenRun, WeighedEarlier
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import EarlierError
 from shipdrag_ros.inference.decision import UNKNOWN, Names, Verdict, decide, marginals, mixture
-from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
+from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import EffectWay, kept_way
@@ -325,8 +325,6 @@ def _refuse_twice(earlier: Sequence[EarlierDiagnosis], runs: Sequence[SeenRun]) 
 
 
 _HALF = priors.EARLIER_COUNTS.mean
-_WIDEST = 1.0  # sd of the logarithm of a size ...
-_WIDE = 2.0  # ... and a relative sd that is wider
 _LEAST = 0.01  # probability that is worth a word
 
 
@@ -525,12 +523,8 @@ def _sd(size: Parameter) -> float:
 
 def _about(vague: Prior, mean: float, sd: float) -> Prior:
     """Return the prior of a size about what was found; of no width where there is none."""
-    if vague.shape is Shape.NORMAL:
-        return normal(sd, mean=mean)
-    if mean <= 0.0:
-        return normal(0.0)
-    relative = min(sd / mean, _WIDE)  # a file may state any; the square of a large one overflows
-    return log_normal(mean, min(math.sqrt(math.log1p(relative**2)), _WIDEST))
+    found = vague.shape is Shape.NORMAL or mean > 0.0
+    return vague.about(mean, sd) if found else normal(0.0)
 
 
 def carried(

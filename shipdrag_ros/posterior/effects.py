@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 from scipy.special import ndtri
 
-from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
+from shipdrag_ros.parameter import Parameter, Prior, Shape
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
@@ -139,7 +139,7 @@ def stated_way(stated: StatedEffect, ship: Ship) -> EffectWay:
     unknowns = []
     for q in effect.parameters_of(ship):
         given = stated.parameters.get(q.name, Parameter(float(np.nan_to_num(q.value)), 0.0))
-        unknowns.append(replace(q, prior=normal(given.sd, mean=given.value)))
+        unknowns.append(replace(q, prior=q.prior.about(given.value, given.sd)))
     return EffectWay(effect, tuple(unknowns), (), (0.0,) * len(unknowns), 0.0, stated=True)
 
 

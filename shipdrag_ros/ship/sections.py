@@ -345,7 +345,7 @@ def _inside(
     # the last digit of a Froude number made from a speed may lie outside
     near = np.clip(at, points[0], points[-1])
     outside = ~(np.abs(at - near) <= 1e-12 * points[-1])
-    result: Float64 = _curve(points, values)(near)
+    result: Float64 = _curve(tuple(points), tuple(values))(near)  # made in Python: any sequence
     if np.any(outside):
         worst = float(np.asarray(at)[outside].flat[0])
         raise ShipdragError(

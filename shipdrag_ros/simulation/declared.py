@@ -256,8 +256,9 @@ def _action(part: TermPart, acting: _Acting, is_share: bool) -> Action:
             return Action(log_lag_s=amount)
         case 'shaft':
             return Action(stall_m_s=amount)
-        case _:
+        case 'depth':
             return Action(depth_m=amount)
+    raise KeyError(part.channel)
 
 
 def _moved(part: TermPart, acting: _Acting) -> Action:

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.parameter import Shape, log_normal
+from shipdrag_ros.parameter import Parameter, Shape, log_normal
 from shipdrag_ros.posterior.effects import retardation_of as found_retardation
-from shipdrag_ros.posterior.effects import ways_of
+from shipdrag_ros.posterior.effects import stated_way, ways_of
 from shipdrag_ros.posterior.priors import UNNAMED_ODDS
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import Action, Scenario, simulate_columns
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import LIBRARY, action_of, parse
@@ -70,3 +70,15 @@ def test_a_pair_begins_with_as_much_of_a_current_as_is_left_beside_the_other() -
     delays = list(ways_of(LIBRARY['time_offset'], Ship.example(), 600.0, 1))
     assert delays[0].start == (0.0,)  # which sailing begins with
     assert {way.resized(0.25) for way in delays[1:]} == {way.start[0] for way in delays[1:]}
+
+
+def test_a_size_that_the_file_hardly_knows_keeps_its_sign() -> None:
+    given = {'force_n': 4e4, 'from': -1.0, 'wave_length_m': 90.0}
+    hardly = {n: Parameter(v, 0.0 if n == 'from' else 2.0 * abs(v)) for n, v in given.items()}
+    ship = Ship.example()
+    way = stated_way(StatedEffect('waves', hardly), ship)
+    frame = Frame(ship, Scenario(speed_m_s=6.0), 0.0)
+    for z in (-3.0, 0.0, 3.0):
+        assert way.action(frame, [z] * len(way.unknowns)).wave_encounter_s_m > 0.0
+    values = [q.prior.at(0.0) for q in way.unknowns]
+    assert values == list(given.values())

@@ -335,3 +335,9 @@ def test_a_wrong_run_file_says_what_is_wrong(text: str, wrong: str) -> None:
 def test_a_volume_that_cannot_be_hers_is_refused() -> None:
     with pytest.raises(ShipFileError, match=r'run\.yaml'):
         RunSheet(displaced_volume_m3=40.0).of(SHIP, subject='run.yaml')
+
+
+@pytest.mark.parametrize('kind', [tuple, list, np.array])
+def test_a_table_made_in_python_may_be_any_sequence(kind: Any) -> None:
+    table = TableBaseline(kind([0.0, 1.0, 2.0]), kind([0.0, 1.0, 4.0]), 0.1)
+    assert float(table.resistance(np.array([1.0]))[0]) == 1.0

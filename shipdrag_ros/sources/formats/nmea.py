@@ -357,7 +357,11 @@ def _columns(values: array[int], width: int) -> Int64:
 def _stamps(
     place: Int64, code: UInt8, received: Int64, stated: Int64, steps: Int64
 ) -> tuple[Int64, NDArray[np.str_]]:
-    """Return the times (n,) of samples [ns], and why one has none; see `TakenSentences`."""
+    """
+    Return the times (n,) of samples [ns], and why one has none.
+
+    Rows of `stated`: place and time; of `steps`: place, time and receipt.
+    """
     stamps = received.copy()  # before the first time
     reason = np.where(received == _NONE, _BEFORE, '').astype('U32')
     own = np.isin(place, stated[0])
