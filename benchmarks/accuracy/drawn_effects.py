@@ -71,7 +71,7 @@ class Case(NamedTuple):
         if rng.uniform() < empty:
             return cls('none', {}, seed)
         of_it = EFFECTS[name].parameters_of(SHIP)
-        return cls(name, {each.name: each.prior.draw(rng) for each in of_it}, seed)
+        return cls(name, {each.name: _possible(each, rng) for each in of_it}, seed)
 
     @property
     def hidden(self) -> list[StatedEffect]:
@@ -103,6 +103,13 @@ class Case(NamedTuple):
         chances = {each.names: each.probability for each in found.candidates}
         chance = chances.get((self.name,), 0.0) if self.sizes else found.nothing
         return math.log(max(chance, LEAST))
+
+
+def _possible(size: Parameter, rng: np.random.Generator) -> float:
+    """Draw a size that can be on this ship."""
+    while not size.low <= (value := size.prior.draw(rng)) <= size.high:
+        pass
+    return value
 
 
 def answered(runs: Sequence[CoastRun], ship: Ship = SHIP) -> DiagnosisResult:

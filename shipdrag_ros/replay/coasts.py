@@ -112,8 +112,14 @@ def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
         if not coastdown.withdrawn:
             start_ns, steady = begins(coastdown)
             window = window_between(result, start_ns, coastdown.end_ns, steady=steady)
-            found.append((coastdown, replace(window, told_ns=coastdown.told_ns)))
+            found.append((coastdown, _as_told(window, coastdown)))
     return found
+
+
+def _as_told(window: Window, coastdown: EndedCoastdown) -> Window:
+    """Say in a window what a person said of its coastdown."""
+    found = coastdown.ended_by is not EndedBy.GIVEN
+    return replace(window, told_ns=coastdown.told_ns, found=found)
 
 
 def begins(coastdown: EndedCoastdown) -> tuple[int, bool]:
@@ -152,8 +158,7 @@ def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | No
         return None
     first_ns = min(start_ns, *(first for first, _ in parts))
     last_ns = max(coastdown.end_ns, *(last for _, last in parts))
-    window = window_between(result, first_ns, last_ns, steady=steady)
-    return replace(window, told_ns=coastdown.told_ns)
+    return _as_told(window_between(result, first_ns, last_ns, steady=steady), coastdown)
 
 
 def dismissed_glides(result: ReplayResult) -> list[Window]:

@@ -70,8 +70,9 @@ def test_what_the_clocks_do_not_ask_for_is_not_done(ship, parameters, voyage, tm
     (run,) = open_runs([write_run(tmp_path / 'sound.mcap', voyage(), ship=ship)])
     result = replay(run, parameters=parameters)
     assert clocks_apart(result) == ()
-    ((coastdown, _),) = coast_windows(result)
+    ((coastdown, window),) = coast_windows(result)
     assert (coastdown,) == result.coastdowns
+    assert window.found
     assert coastdown.estimate is not None
 
 
@@ -81,6 +82,7 @@ def test_a_window_that_was_given_stays(ship, parameters, voyage, tmp_path) -> No
     result = replay(run, parameters=parameters, window=(450.0, 900.0))
     ((coastdown, window),) = coast_windows(result)
     assert coastdown.ended_by is EndedBy.GIVEN
+    assert not window.found
     assert (window.start_ns, window.end_ns) == (coastdown.start_ns, coastdown.end_ns)
     assert len(window.speed_through_water.value) > 400
 

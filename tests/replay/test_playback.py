@@ -298,6 +298,7 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(tmp_path, ship, voy
     # and the fit of the whole of it has the time, on board and in replay
     (ended,) = (each for each in session.events if isinstance(each, EndedCoastdown))
     windows = [session.monitor.ended_window(ended), *(each for _, each in coast_windows(result))]
+    assert all(each.found for each in windows)
     said = [RunDown.of(each, ship) for each in windows]
     assert said[0] == said[1]
     assert said[0].stop_ns == pytest.approx(now_ns, abs=6e9)
