@@ -2,9 +2,9 @@
 """
 Effects of the library in sizes drawn from their own priors, simulated and diagnosed.
 
-    python -m benchmarks.accuracy.drawn_effects --what limits --count 120
-    python -m benchmarks.accuracy.drawn_effects --what gap --count 60
-    python -m benchmarks.accuracy.drawn_effects --what runs --count 60
+    python -m benchmarks.accuracy.drawn_effects --what limits --count 100
+    python -m benchmarks.accuracy.drawn_effects --what gap --count 50
+    python -m benchmarks.accuracy.drawn_effects --what runs --count 20
     python -m benchmarks.accuracy.drawn_effects --what rate --count 60
     python -m benchmarks.accuracy.drawn_effects --what log --count 40
     python -m benchmarks.accuracy.drawn_effects --what wind --count 12
@@ -205,7 +205,8 @@ def _paired(figures: Float64) -> Iterator[str]:
     yield from _means(figures)
     for k in range(1, figures.shape[1]):
         more = figures[:, k] - figures[:, 0]
-        yield f'{more.mean():+.2f} ± {2.0 * more.std(ddof=1) / math.sqrt(max(len(more), 1)):.2f}'
+        twice = f'{2.0 * more.std(ddof=1) / math.sqrt(len(more)):.2f}' if len(more) > 1 else '-'
+        yield f'{more.mean():+.2f} ± {twice}'
 
 
 COLUMNS = {
