@@ -620,12 +620,7 @@ class Monitor:
         log, doubt = self._vouching.log_doubt
         told_ns = None if self._regimes is None else self._regimes.told_ns
         return replace(
-            window,
-            notes=notes,
-            doubted_log=log,
-            log_doubt=doubt,
-            told_ns=told_ns,
-            found=True,
+            window, notes=notes, doubted_log=log, log_doubt=doubt, told_ns=told_ns, found=True
         )
 
     # how a coastdown ends

@@ -29,7 +29,7 @@ from shipdrag_ros.samples import Float64
 _POINTS = 101
 _OPPOSITE = 0.5  # cosine of the angle between runs below which they are separated
 _LARGEST_CURRENT = 0.4  # of the lowest speed
-_TRIED = 41
+_TRIED = 41  # currents, evenly, between two of which the best is sought
 _LEAST_SEEN = 1e-3  # of a prior's information: what a run says that has seen nothing
 
 
